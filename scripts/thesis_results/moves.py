@@ -12,7 +12,8 @@ from benchmarks.matchers import MATCHERS, MatcherName
 from benchmarks.scans import HEAD, KINDS, ScanMaker, SonarKind, still
 from matplotlib.axes import Axes
 
-from mlsm_manager.localisation.estimator import Estimator, MapSettings
+from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.replay_parameters import ReplayParameters

@@ -2,7 +2,6 @@
 
 from abc import ABC, abstractmethod
 from collections import deque
-from dataclasses import dataclass
 from typing import Deque, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -11,35 +10,18 @@ from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
+from mlsm_manager.localisation.keyframe_map import KeyframeMaps, MapSettings
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
-from mlsm_manager.surface_map.free_space import Carver, CarveReport
-from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import transformed
 
 _MOST_WAITING = 8
 """Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""
-
-
-@dataclass(frozen=True)
-class MapSettings:
-    """The grids of the map that is shown and of the map that is matched with.
-
-    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
-    of blocks to reserve memory for.
-    carver: what marks free space and takes blocks away that beams go through; None where that is not wanted.
-    """
-
-    resolution: float
-    match_resolution: float
-    limit: float
-    expected_blocks: int
-    carver: Optional[Carver] = None
 
 
 class Estimator(ABC):
@@ -49,6 +31,9 @@ class Estimator(ABC):
     both are placed by the odometry as corrected so far. An estimator may change the poses of earlier scans with each
     one that is added: `belief`, the maps and the places of clouds are what it knows at the time they are asked for.
     """
+
+    _bends = False
+    """Whether what is settled in the maps may move with the path."""
 
     def __init__(
         self,
@@ -65,9 +50,16 @@ class Estimator(ABC):
         self._sonar_in_base = np.array(sonar_in_base, dtype=np.float64)
         self.clear()
 
-    @abstractmethod
     def clear(self) -> None:
         """Delete the map, and forget the pose in it."""
+        self._maps = KeyframeMaps(self.settings, self._bends)
+        self.forget_place()
+
+    def _take(self, layers: Mapping[Layer, Blocks]) -> None:
+        """Have stored maps in the place of the present ones, and forget the pose; see `restore`."""
+        maps = KeyframeMaps.of_layers(self.settings, layers, self._bends)
+        self.forget_place()
+        self._maps = maps
 
     def forget_place(self) -> None:
         """Keep the map but forget the pose, because time jumped."""
@@ -115,19 +107,19 @@ class Estimator(ABC):
         return []
 
     @property
-    @abstractmethod
     def shown(self) -> MultiLevelSurfaceMap:
         """The map that is shown and saved."""
+        return self._maps.shown.map
 
     @property
-    @abstractmethod
     def matched(self) -> MultiLevelSurfaceMap:
-        """The map that scans are matched with."""
+        """The map that scans are matched with, that is searched for a lost vehicle, and among which a run begins."""
+        return self._maps.matched.map
 
     @property
-    @abstractmethod
-    def free(self) -> Union[MultiLevelSurfaceMap, KeyframeCarving]:
+    def free(self) -> KeyframeCarving:
         """What is known to be free, in the map that is shown."""
+        return self._maps.shown.free
 
     @property
     def target(self) -> BlockSource:
@@ -171,7 +163,7 @@ class Estimator(ABC):
 
     def add_points(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""
-        return CloudUpdate(self._insert(points), False, 0)
+        return CloudUpdate(self._maps.shown.insert(points), False, 0)
 
     def add_cloud(self, cloud: MapCloud) -> CloudUpdate:
         """Insert a cloud into the map that is shown, or let it wait until the pose of its time is known."""
@@ -190,7 +182,7 @@ class Estimator(ABC):
             points, times = self._uncarved.popleft()
             origins = self._origins(times)
             if origins is not None:
-                return CloudUpdate(NOTHING_INSERTED, False, 0, self._carve(points, times, origins))
+                return CloudUpdate(NOTHING_INSERTED, False, 0, self._maps.shown.carve(points, times, origins))
         return None
 
     @property
@@ -202,29 +194,25 @@ class Estimator(ABC):
     def _add_matched(self, cloud: MapCloud) -> CloudUpdate:
         """Insert a cloud where matched scans put it, or let it wait."""
 
-    @abstractmethod
-    def _insert(self, points: np.ndarray) -> InsertReport:
-        """Insert points (n, 4) in map into the map that is shown."""
-
-    @abstractmethod
-    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
-        """Carve the map that is shown with points (n, 4) in it, of beams taken at `times` (n,) s from `origins` (n, 2).
-
-        Return None where nothing is to be carved.
-        """
-
     def _wait(self, cloud: MapCloud) -> CloudUpdate:
         self._waiting.append(cloud)
         return CloudUpdate(NOTHING_INSERTED, True, 0)
 
     def _show(self, points: np.ndarray, times: np.ndarray, unplaced: int) -> CloudUpdate:
         """Insert points (n, 4) in map, of beams taken at `times` (n,), and carve once it is known from where."""
-        report, origins = self._insert(points), self._origins(times)
+        report, origins = self._maps.shown.insert(points), self._origins(times)
         if origins is not None:
-            return CloudUpdate(report, False, unplaced, self._carve(points, times, origins))
+            return CloudUpdate(report, False, unplaced, self._maps.shown.carve(points, times, origins))
         if len(points):
             self._uncarved.append((points, times))
         return CloudUpdate(report, False, unplaced)
+
+    def _insert_matched(self, points: np.ndarray, times: np.ndarray) -> None:
+        """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is matched with; carve it."""
+        self._maps.matched.insert(points)
+        origins = self._origins(times)
+        if origins is not None:
+            self._maps.matched.carve(points, times, origins)
 
     def _origins(self, times: np.ndarray) -> Optional[np.ndarray]:
         """Return where the sonar was in map at `times` (n,) [s], (n, 2) m; None where not all of them are known."""

@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Fix
 from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
-from mlsm_manager.localisation.estimator import Estimator, MapSettings
+from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.joint_session import (
     JointSession,
     belief_at,
@@ -20,8 +20,7 @@ from mlsm_manager.localisation.joint_session import (
     prior_at,
     update_of,
 )
-from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
-from mlsm_manager.localisation.keyframe_map import JointMaps
+from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
@@ -31,10 +30,8 @@ from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
-from mlsm_manager.surface_map.free_space import CarveReport
-from mlsm_manager.surface_map.insertion import InsertReport, admitted
+from mlsm_manager.surface_map.insertion import admitted
 from mlsm_manager.surface_map.map_file import Layer
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, transformed
 
 _KNOWN_SCALE = 0.05
@@ -65,6 +62,8 @@ class Joint(Estimator):
     its own solver finds on the map too.
     """
 
+    _bends = True
+
     def __init__(
         self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher, sonar_in_base: Sequence[float],
         parameters: SolverParameters, without_positions: Optional[Assumed] = None,
@@ -80,8 +79,7 @@ class Joint(Estimator):
     def clear(self) -> None:
         """Forget the map and the place in it."""
         self._session = None
-        self._maps = JointMaps(self.settings)
-        self.forget_place()
+        super().clear()
 
     def forget_place(self) -> None:
         """Keep the map but forget where the vehicle is, because time jumped."""
@@ -126,21 +124,6 @@ class Joint(Estimator):
         return self._maps.matched.drawn_until(min(session.apart_from, before_newest), session)
 
     @property
-    def shown(self) -> MultiLevelSurfaceMap:
-        """The map that is shown and saved."""
-        return self._maps.shown.map
-
-    @property
-    def matched(self) -> MultiLevelSurfaceMap:
-        """The map that is searched for a lost vehicle, and whose surfaces a new run begins among."""
-        return self._maps.matched.map
-
-    @property
-    def free(self) -> KeyframeCarving:
-        """What is known to be free, in the map that is shown."""
-        return self._maps.shown.free
-
-    @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
         """What `restore` needs to go on with the present run, as arrays; none without a run or after a long one."""
         return {} if self._session is None else self._maps.stored(self._session)
@@ -166,12 +149,6 @@ class Joint(Estimator):
         other = self._without_positions
         if other is not None and np.array_equal(run.solver.get(ODOMETRY, ()), name_of(other.parameters.odometry)):
             self.parameters, self.errors = other
-
-    def _take(self, layers: Mapping[Layer, Blocks]) -> None:
-        maps = JointMaps.of_layers(self.settings, layers)
-        self._end_session()
-        self._maps = maps
-        self.forget_place()
 
     def add_scan(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan together with those of the scans before it, and draw the map anew."""
@@ -234,12 +211,6 @@ class Joint(Estimator):
         carved = self._maps.shown.draw(session, session.settled_until)
         _, report = admitted(cloud.points, self.settings.limit)
         return CloudUpdate(report, False, 0, carved)
-
-    def _insert(self, points: np.ndarray) -> InsertReport:
-        return self._maps.shown.insert(points)
-
-    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
-        return self._maps.shown.carve(points, times, origins)
 
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
@@ -317,11 +288,7 @@ class Joint(Estimator):
         self.belief = belief_at(scan.reference_time, pose, self.errors)
         times = np.linspace(scan.start, scan.reference_time, PATH_POINTS)
         self._history.add(times, composed(self.correction, scan.track.at(times)), scan.track, holds=True)
-        points = transformed(self.correction, scan.points)
-        self._maps.matched.insert(points)
-        origins = self._origins(scan.times)
-        if origins is not None:
-            self._maps.matched.carve(points, scan.times, origins)
+        self._insert_matched(transformed(self.correction, scan.points), scan.times)
         return ScanUpdate(scan, None, True, self.belief)
 
     def _end_session(self, until: float = np.inf) -> None:

@@ -10,14 +10,7 @@ import numpy as np
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
-from mlsm_manager.surface_map.free_space import (
-    BeamFindings,
-    Carver,
-    CarveReport,
-    FirstEchoes,
-    note_free,
-    pairs_of_groups,
-)
+from mlsm_manager.surface_map.free_space import BeamFindings, Carver, CarveReport, FirstEchoes, pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Overlay
 
@@ -94,10 +87,7 @@ class KeyframeCarving:
         """
         if self._carver is None:
             return None, None
-        findings = self._carver.findings(surface_map, FirstEchoes.of_level(points, times, origins), points)
-        removed = self._carver.charge(surface_map, findings)
-        noted = note_free(self._free, findings.free)
-        return CarveReport(len(findings.free), len(findings.rows), removed), noted
+        return self._carver.carve(surface_map, self._free, FirstEchoes.of_level(points, times, origins), points)
 
     def forget_oldest(self) -> None:
         """Forget what the oldest keyframe said, because it is settled."""

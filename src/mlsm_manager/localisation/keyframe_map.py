@@ -1,13 +1,13 @@
 """Maps drawn from keyframes: clouds whose places may still change are kept as points and drawn anew when they do."""
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Deque, Dict, List, Mapping, Optional
 
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.clouds import MapCloud, Placement
-from mlsm_manager.localisation.estimator import MapSettings
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
 from mlsm_manager.localisation.resumption import StoredRun
@@ -18,6 +18,22 @@ from mlsm_manager.surface_map.insertion import InsertReport, blocks_of
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.overlay import Covered, Overlay
+
+
+@dataclass(frozen=True)
+class MapSettings:
+    """The grids of the map that is shown and of the map that is matched with.
+
+    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
+    of blocks to reserve memory for.
+    carver: what marks free space and takes blocks away that beams go through; None where that is not wanted.
+    """
+
+    resolution: float
+    match_resolution: float
+    limit: float
+    expected_blocks: int
+    carver: Optional[Carver] = None
 
 
 class KeyframeMap:
@@ -176,25 +192,27 @@ class KeyframeMap:
         self._overlay.hide(self._free.outworn(self._map))
 
 
-class JointMaps:
+class KeyframeMaps:
     """shown: the map of clouds that is shown and saved. matched: the map of echoes in which a lost vehicle is searched.
 
     The matched map is carved by settled scans only: it shows nobody what may still change.
     """
 
-    def __init__(self, settings: MapSettings) -> None:
+    def __init__(self, settings: MapSettings, bends: bool = True) -> None:
+        """bends: whether what is settled may move with the path, for `redraw`."""
         own = settings
-        shown, matched = (Stretches(resolution) for resolution in (own.resolution, own.match_resolution))
+        sides = own.resolution, own.match_resolution
+        shown, matched = (Stretches(resolution) if bends else None for resolution in sides)
         self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.carver, stretches=shown)
         self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.carver, most_followed=0, stretches=matched)
 
     @classmethod
-    def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks]) -> "JointMaps":
+    def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks], bends: bool = True) -> "KeyframeMaps":
         """Return stored maps; one without a matched layer is matched with as it is shown.
 
         Raises ValueError for other resolutions than those of the settings.
         """
-        maps, blocks = cls(settings), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        maps, blocks = cls(settings, bends), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
         maps.shown.map.insert_blocks(blocks)
         maps.matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
         if Layer.FREE in layers:

@@ -8,8 +8,9 @@ import numpy as np
 
 from georeferencing.asked import AskedOrigin
 from mlsm_manager.joint_solver.parameters import JointSolverParameters, SolverParameters
-from mlsm_manager.localisation.estimator import Estimator, MapSettings
+from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.joint import Assumed, Joint
+from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryChoice, OdometryKind, profile_values
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator

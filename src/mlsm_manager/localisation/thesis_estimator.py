@@ -1,6 +1,6 @@
 """The thesis's way (6.5.6): each scan is matched alone, with the map of the scans before, or rejected."""
 
-from typing import List, Mapping, Optional
+from typing import Mapping
 
 import numpy as np
 
@@ -11,10 +11,7 @@ from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, u
 from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
 from mlsm_manager.scan_matching.scan_path import ERRORS
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.free_space import CarveReport, FirstEchoes
-from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.map_file import Layer
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed
 
 _FEWEST_BLOCKS = 15  # of a map that can be matched with: fewer do not fix three coordinates against chance
@@ -27,47 +24,12 @@ class ThesisEstimator(Estimator):
     corrected so far and inserted; its pose is then certain.
     """
 
-    def clear(self) -> None:
-        """Delete the map, and forget the pose in it."""
-        self._shown, self._matched, self._free = self._new_maps()
-        self.forget_place()
-
-    def _new_maps(self) -> List[MultiLevelSurfaceMap]:
-        own = self.settings
-        return [
-            MultiLevelSurfaceMap(own.resolution, own.limit, own.expected_blocks),
-            MultiLevelSurfaceMap(own.match_resolution, own.limit),
-            MultiLevelSurfaceMap(own.resolution, own.limit),
-        ]
-
-    @property
-    def shown(self) -> MultiLevelSurfaceMap:
-        """The map that is shown and saved."""
-        return self._shown
-
-    @property
-    def matched(self) -> MultiLevelSurfaceMap:
-        """The map that scans are matched with."""
-        return self._matched
-
-    @property
-    def free(self) -> MultiLevelSurfaceMap:
-        """What is known to be free, in the map that is shown."""
-        return self._free
-
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
         """Take stored maps in the place of the present ones, and forget the place; there is no run to go on with.
 
         See Estimator.restore.
         """
-        maps, blocks = self._new_maps(), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
-        shown, matched, free = maps
-        shown.insert_blocks(blocks)
-        matched.insert_blocks(layers.get(Layer.MATCHED, blocks))
-        if Layer.FREE in layers:
-            free.insert_blocks(layers[Layer.FREE])
-        self._shown, self._matched, self._free = maps
-        self.forget_place()
+        self._take(layers)
         return ""
 
     def add_scan(self, scan: Scan) -> ScanUpdate:
@@ -101,22 +63,6 @@ class ThesisEstimator(Estimator):
             return self._wait(cloud)
         points, times = self._history.placed(cloud)
         return self._show(points, times, len(cloud) - len(points))
-
-    def _insert(self, points: np.ndarray) -> InsertReport:
-        return self.shown.insert(points)
-
-    def _carve(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
-        if self.settings.carver is None:
-            return None
-        beams = FirstEchoes.of_level(points, times, origins)
-        return self.settings.carver.carve(self.shown, self.free, beams, points)
-
-    def _insert_matched(self, points: np.ndarray, times: np.ndarray) -> None:
-        """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is matched with; clear it."""
-        self.matched.insert(points)
-        origins = self._origins(times)
-        if self.settings.carver is not None and origins is not None:
-            self.settings.carver.clear(self.matched, FirstEchoes.of_level(points, times, origins), points)
 
     def _place(self, scan: Scan, belief: Belief) -> ScanUpdate:
         times, poses = self._path(scan, belief)

@@ -12,8 +12,7 @@ from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Solution, solved_path
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.estimator import MapSettings
-from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.motion_findings import MotionFindings, motion_findings
 from mlsm_manager.scan_matching.scan import Scan, Track

@@ -190,16 +190,15 @@ class Carver:
 
     def carve(
         self, occupied: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray
-    ) -> CarveReport:
-        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side."""
+    ) -> Tuple[CarveReport, Blocks]:
+        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side.
+
+        Return a report, and what was not known to be free.
+        """
         findings = self.findings(occupied, beams, points)
         removed = self.charge(occupied, findings)
-        note_free(free, findings.free)
-        return CarveReport(len(findings.free), len(findings.rows), removed)
-
-    def clear(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> int:
-        """As `carve` for a map whose free space nobody wants to know; return how many blocks went."""
-        return self.charge(occupied, self.findings(occupied, beams, points))
+        noted = note_free(free, findings.free)
+        return CarveReport(len(findings.free), len(findings.rows), removed), noted
 
     def findings(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> BeamFindings:
         """Return what a scan says whose points (n, >= 3) are in `occupied` already.

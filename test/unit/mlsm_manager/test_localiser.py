@@ -7,7 +7,7 @@ from made_open_water import bubbles, outcome
 from made_scans import SECONDS, drifting, elsewhere, harbour, map_of, scan_of, still, wall
 
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.estimator import MapSettings
+from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, LocaliserParameters, MlsmCoreParameters
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator

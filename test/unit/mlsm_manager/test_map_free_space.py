@@ -31,7 +31,7 @@ class Water:
         self.occupied.insert(points)
         origins = np.tile(origin, (len(points), 1))
         beams = FirstEchoes.of_points(points, np.arange(len(points)), origins)
-        return self._carver.carve(self.occupied, self.free, beams, points)
+        return self._carver.carve(self.occupied, self.free, beams, points)[0]
 
     def put(self, *place):
         """Put a block there that no scan saw."""
