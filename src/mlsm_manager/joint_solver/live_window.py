@@ -142,6 +142,9 @@ class LiveWindow:
         self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
+        self._recent_rows = self._log.rows(self._recent, last)
+        self._newest_start = self._layout.node_start(last)
+        self._believed_columns = self._layout.with_run(np.array([first]))[0]
         self._motion = self._log.node_motion(np.arange(first, last + 1))
         self._beliefs = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
         self._known = solution.known
@@ -185,13 +188,12 @@ class LiveWindow:
         self._run.fixes.add(equations, self._layout, self._motion.poses, free)
         self._comparisons = self._add_surfaces(equations, cut)
         self._comparisons += self._posts.add(equations, self._layout, self._run, cut)
-        newest = self._layout.node_start(self._layout.last)
-        self._prior.add(equations, newest, self._state.nodes[-1])
+        self._prior.add(equations, self._newest_start, self._state.nodes[-1])
         if bend is not None:
             add_loops(equations, self._layout, bend.loops, self._state.nodes, bend.start)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
-        self._prior.learn(newest, self._state.nodes[-1], self._own_covariance)
+        self._prior.learn(self._newest_start, self._state.nodes[-1], self._own_covariance)
 
     def _own_covariance(self, columns: np.ndarray) -> np.ndarray:
         """Return the covariance (k, k) of unknowns (k,) if the frozen map had no error."""
@@ -207,7 +209,7 @@ class LiveWindow:
             cross = np.zeros((POSE_COLUMNS, 2, 2))
             cross[:, 0, 1] = cross[:, 1, 0] = -(deviations[POSE] ** -2.0)
             equations.add_terms(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
-        equations.add_prior(layout.with_run(np.array([layout.first]))[0], value, mean, deviations)
+        equations.add_prior(self._believed_columns, value, mean, deviations)
 
     def _beliefs_before(self, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
         """Return mean and deviations, (width + 2,) each, of the run's first node and of the run's unknowns."""
@@ -241,8 +243,7 @@ class LiveWindow:
     def _surfaces_met(self, cut: float) -> Met:
         """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed."""
         parameters = self._parameters
-        rows = self._log.rows(self._recent, self._layout.last)
-        recent = self._run.placed(rows)
+        recent = self._run.placed(self._recent_rows)
         frozen = self._frozen.moved_by_run(self._state.run)
         weak = WeakDirections.of((frozen, recent), parameters)
         frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))

@@ -26,11 +26,6 @@ class GrowingArray:
     def __len__(self) -> int:
         return len(self.values)
 
-    def replace_from(self, start: int, rows: np.ndarray) -> None:
-        """Put rows (m, ...) in place of those from `start` on."""
-        self.shorten(start)
-        self.extend(rows)
-
     def shorten(self, count: int) -> None:
         """Keep the first `count` rows."""
         self.values = self.values[:count]

@@ -1,7 +1,7 @@
 """What was measured during a run: surface points of every scan, the nodes' times and the odometry."""
 
 from dataclasses import fields
-from typing import List, Optional, Sequence
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -43,7 +43,7 @@ class PointTable:
         """Return a table of `scan` and all later ones, the first of which is number 0 there."""
         later = PointTable()
         for number in range(scan, self.scan_count):
-            later.append(self.points(self.rows(number, number + 1)))
+            later.append(self.points(self.rows(number, number + 1))[0])
         return later
 
     def shorten(self, scans: int) -> None:
@@ -61,13 +61,10 @@ class PointTable:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
         return np.arange(self._starts[first], self._starts[last])
 
-    def points(self, rows: np.ndarray) -> SurfacePoints:
-        """Return the points in `rows` (n,) int."""
-        return SurfacePoints(*self._table.chosen(rows, *_OF_POINTS))
-
-    def scans(self, rows: np.ndarray) -> np.ndarray:
-        """Return the scan (n,) int of each point in `rows`."""
-        return self._table["scans"][rows].astype(np.int64)
+    def points(self, rows: np.ndarray) -> Tuple[SurfacePoints, np.ndarray]:
+        """Return the points in `rows` (n,) int, and the scan (n,) int of each."""
+        *columns, scans = self._table.chosen(rows, *_OF_POINTS, "scans")
+        return SurfacePoints(*columns), scans.astype(np.int64)
 
 
 class RunLog:

@@ -187,7 +187,7 @@ class Solution:
         """Return points of a table in the map, from the path between the two nodes of the scan that heard each."""
         if not len(rows):
             return NO_POINTS
-        points, scans, log, state = table.points(rows), table.scans(rows), self.log, self.state
+        (points, scans), log, state = table.points(rows), self.log, self.state
         times = points.times + state.run[DELAY]
         nodes = np.unique(np.concatenate([scans, scans + 1]))
         known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)

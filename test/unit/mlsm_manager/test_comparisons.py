@@ -128,7 +128,7 @@ def test_comparisons_do_not_tell_how_the_whole_map_is_turned(log, normal_deviati
 
 def placed_by_numpy(log, odometry, state, rows):
     """Return places, arms, normals and shares of points between two nodes each."""
-    points, scans = log.surfaces.points(rows), log.surfaces.scans(rows)
+    points, scans = log.surfaces.points(rows)
     times = points.times + state.run[1]
     at_nodes, motion = log.node_motion(np.arange(log.scan_count + 1)), log.odometry.motion(times)
     share = (times - at_nodes.times[scans]) / np.diff(at_nodes.times)[scans]

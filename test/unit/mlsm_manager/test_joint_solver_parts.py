@@ -183,7 +183,7 @@ def test_qualities_do_not_jump_when_points_move_a_little():
 
 
 def test_normals_point_away_from_the_sonar(log):
-    points = log.surfaces.points(log.rows(0, 3))
+    points, _ = log.surfaces.points(log.rows(0, 3))
     sight = np.column_stack([np.cos(points.bearings), np.sin(points.bearings)])
     assert isinstance(points, SurfacePoints)
     assert (np.einsum("na,na->n", sight, points.normals) > 0.0).all()
