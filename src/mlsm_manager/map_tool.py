@@ -16,7 +16,7 @@ from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
 from mlsm_manager.surface_map.map_file import StoredMap, read_map
 from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged
 from node_support.files import check_output
-from node_support.help import CommandLine
+from node_support.help import CommandLine, ending_in_one_line
 
 _MAPS = "a map (.mlsm)"
 
@@ -24,17 +24,11 @@ _MAPS = "a map (.mlsm)"
 def run_map_tool() -> None:
     """Run map_tool with the command line; ends with one line and status 1 when something is wrong with the input."""
     options = map_tool_arguments(sys.argv[1:])
-    try:
+    with ending_in_one_line("map_tool", ValueError):
         if "out" in options:
             read = [getattr(options, name) for name in ("map", "first", "second") if name in options]
             check_output(options.out, read, options.overwrite)
         lines = _COMMANDS[options.command](options)
-    except OSError as error:
-        sys.exit(f"map_tool: {error.filename or 'output'}: {error.strerror or error}")
-    except ValueError as error:
-        sys.exit(f"map_tool: {error}")
-    except KeyboardInterrupt:
-        sys.exit("map_tool: interrupted")
     _tell(lines)
 
 

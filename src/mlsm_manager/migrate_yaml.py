@@ -1,7 +1,6 @@
 """migrate_yaml: makes one file of today's parameters of the parameter files of 2015."""
 
 import argparse
-import sys
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
 
@@ -9,7 +8,7 @@ import yaml
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.files import write_whole
-from node_support.help import CommandLine
+from node_support.help import CommandLine, ending_in_one_line
 from node_support.names_2015 import KEYS, Key
 from node_support.parameter_files import read_values
 from node_support.parameters import EXPERT, ParameterError, ParameterSet
@@ -42,12 +41,8 @@ def run_migrate_yaml() -> None:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help=f"folder to write {FILE} to; created if missing"
     )
-    try:
+    with ending_in_one_line("migrate_yaml", ParameterError):
         print("\n".join(migrated(parser.parse_args())))
-    except ParameterError as error:
-        sys.exit(f"migrate_yaml: {error}")
-    except OSError as error:
-        sys.exit(f"migrate_yaml: {error.filename or 'output'}: {error.strerror or error}")
 
 
 def migrated(options: argparse.Namespace) -> List[str]:

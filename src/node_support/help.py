@@ -7,8 +7,9 @@ import re
 import signal
 import sys
 import textwrap
+from contextlib import contextmanager
 from enum import Enum
-from typing import IO, List, Mapping, Optional, Type
+from typing import IO, Iterator, List, Mapping, Optional, Type
 
 from node_support.files import PACKAGE
 from node_support.node_table import DIAGNOSTICS, HOSTS, NODES, Interface, Role
@@ -27,6 +28,19 @@ class CommandLine(argparse.ArgumentParser):
     def print_help(self, file: Optional[IO[str]] = None) -> None:
         """Print the help on `file`, standard output unless told otherwise."""
         write_help(self.format_help().rstrip("\n"), file or sys.stdout)
+
+
+@contextmanager
+def ending_in_one_line(program: str, *refused: Type[Exception]) -> Iterator[None]:
+    """End the process with one line and status 1 for an error of the classes `refused`, an OSError, and for Ctrl-C."""
+    try:
+        yield
+    except refused as error:
+        sys.exit(f"{program}: {error}")
+    except OSError as error:
+        sys.exit(f"{program}: {error.filename or 'output'}: {error.strerror or error}")
+    except KeyboardInterrupt:
+        sys.exit(f"{program}: interrupted")
 
 
 def positive(text: str) -> float:

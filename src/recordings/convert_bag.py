@@ -9,7 +9,7 @@ import numpy as np
 
 from node_support import topics
 from node_support.files import check_output, whole_file
-from node_support.help import CommandLine
+from node_support.help import CommandLine, ending_in_one_line
 from node_support.parameter_files import assigned_values
 from node_support.parameters import ParameterError
 from recordings.bags.bag import RecordingError
@@ -32,14 +32,8 @@ _Stamped = Tuple[int, str, Any]  # ns, topic and message
 
 def run_convert_bag() -> None:
     """Run convert_bag with the command line; ends with one line and status 1 when something is wrong."""
-    try:
+    with ending_in_one_line("convert_bag", ParameterError, RecordingError):
         print(convert_bag(sys.argv[1:]))
-    except (ParameterError, RecordingError) as error:
-        sys.exit(f"convert_bag: {error}")
-    except OSError as error:
-        sys.exit(f"convert_bag: {error.filename or 'output'}: {error.strerror or error}")
-    except KeyboardInterrupt:
-        sys.exit("convert_bag: interrupted; nothing was written")
 
 
 def convert_bag(arguments: List[str]) -> str:

@@ -22,7 +22,7 @@ from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.report.mission import Mission
 from node_support.errors import RefusedInput
 from node_support.files import make_folder, write_whole
-from node_support.help import CommandLine
+from node_support.help import CommandLine, ending_in_one_line
 from node_support.parameter_files import assigned_values, read_values
 from node_support.parameters import OLD_KEYS, ParameterError
 from recordings.bags.bag import RecordingError
@@ -34,7 +34,7 @@ from recordings.survey import report, survey
 
 def run_map_bag() -> None:
     """Run map_bag with the command line; ends with one line and status 1 when something is wrong with the input."""
-    try:
+    with ending_in_one_line("map_bag", ParameterError, RecordingError):
         options = map_bag_arguments(sys.argv[1:])
         if options.inspect:
             print("\n\n".join(report(survey(bag, options.request), options.request) for bag in options.bags))
@@ -43,12 +43,6 @@ def run_map_bag() -> None:
             _map_each(options, sys.argv[1:])
             return
         summary = map_bag(options)
-    except (ParameterError, RecordingError) as error:
-        sys.exit(f"map_bag: {error}")
-    except OSError as error:
-        sys.exit(f"map_bag: {error.filename or 'output'}: {error.strerror or error}")
-    except KeyboardInterrupt:
-        sys.exit("map_bag: interrupted")
     print("\n".join(summary_lines(summary, options)))
 
 
