@@ -17,6 +17,11 @@ def wrapped(angle: Angle) -> Angle:
     return (angle + np.pi) % FULL_TURN - np.pi
 
 
+def harmonics(angles: np.ndarray) -> np.ndarray:
+    """Return cosines and sines (n, 4) of angles (n,) [rad] and of twice the angles."""
+    return np.column_stack([part(times * angles) for times in (1.0, 2.0) for part in (np.cos, np.sin)])
+
+
 def unwrapped(angle: float, near: float) -> float:
     """Return the angle, plus or minus whole turns, that is nearest to `near`."""
     return near + wrapped(angle - near)

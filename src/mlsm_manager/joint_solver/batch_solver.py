@@ -8,12 +8,14 @@ import numpy as np
 from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
+from mlsm_manager.joint_solver.heading_errors import by_heading
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, add_loops, loops_of
 from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.normal_equations import (
     POSE_COLUMNS,
     RUN_COLUMNS,
+    YAW,
     Layout,
     NormalEquations,
     State,
@@ -244,7 +246,16 @@ class _Batch:
         poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
         places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
         by_scale = scale_covariance(places, self._parameters.world_scale_deviation(self._run.log))
-        return np.concatenate(poses) + by_scale, self._covariance(run)
+        return np.concatenate(poses) + by_scale + self._by_heading(nodes), self._covariance(run)
+
+    def _by_heading(self, nodes: np.ndarray) -> np.ndarray:
+        """Return what a compass that errs by the heading adds to the covariances of the poses of `nodes` (n,)."""
+        compass, motion = self._odometry.compass, self._motion
+        if compass is None:
+            return np.zeros((len(nodes), POSE_COLUMNS, POSE_COLUMNS))
+        columns = by_heading(compass, self._layout, motion.poses[:, YAW], motion.durations, self._solution.solve)
+        moved = columns[self._layout.pose_columns(nodes)]
+        return moved @ moved.transpose(0, 2, 1)
 
     def told(self) -> Optional[Gaussian]:
         """Return what the echoes alone tell of the unknowns of a mixture of priors; None without one."""

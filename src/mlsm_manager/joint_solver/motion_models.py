@@ -65,6 +65,11 @@ class OdometryModel(Protocol):
         return None
 
     @property
+    def compass(self) -> "Optional[Compass]":
+        """How wrong the reported heading may be; None where none is reported."""
+        return None
+
+    @property
     def calibrated(self) -> Dict[str, int]:
         """Columns that the next run may start from, by name."""
         return {}
@@ -205,6 +210,10 @@ class DvlFactors(OdometryModel):
 
     def __init__(self, parameters: DvlOdometry) -> None:
         self._parameters = parameters
+
+    @property
+    def compass(self) -> Optional[Compass]:
+        return self._parameters.compass
 
     @property
     def freed(self) -> "ThrusterFactors":

@@ -1,6 +1,7 @@
 """Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
 
 from dataclasses import dataclass, replace
+from typing import Optional
 
 import numpy as np
 
@@ -75,6 +76,10 @@ class HeadingFactors(OdometryModel):
 
     def __init__(self, parameters: HeadingOdometry) -> None:
         self._speeds, self._compass = parameters.speeds, parameters.compass
+
+    @property
+    def compass(self) -> Optional[Compass]:
+        return self._compass
 
     @property
     def freed(self) -> "HeadingFactors":
@@ -188,6 +193,10 @@ class UnaidedFactors(HeadingFactors):
 
     def __init__(self, parameters: UnaidedOdometry) -> None:
         self._speeds, self._own = parameters.speeds, parameters
+
+    @property
+    def compass(self) -> None:
+        return None
 
     @property
     def freed(self) -> None:

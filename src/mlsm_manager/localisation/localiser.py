@@ -21,7 +21,7 @@ from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Matcher, Scan, Track
-from mlsm_manager.scan_matching.scan_path import POSE, POSITION
+from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.verdict import Verdict
@@ -151,7 +151,7 @@ class Localiser:
             if update.belief is not None:
                 self._live.believe(update.belief)
                 self._age.learn_odometry(scan.reference_time, scan.reference_pose)
-                self._causes.take(scan, update.belief.theta[POSITION])
+                self._causes.take(scan, update.belief.theta[POSE])
             if update.accepted and update.result is not None:
                 self._age.learn_fix(scan.reference_time)
                 added = self._causes.covariance(self.steps)

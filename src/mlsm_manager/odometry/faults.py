@@ -7,7 +7,7 @@ from typing import Callable, Dict, List, Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse
+from node_support.geometry import composed, harmonics, inverse
 
 # rad and relative: a marina's unbroken compass errs by 3 degrees with the heading, a DVL by three times 1 percent.
 _USUAL_HEADING, _USUAL_LENGTH = np.radians(4.0), 0.04
@@ -55,7 +55,7 @@ class MotionFault:
         if self.kind is FaultKind.DRIFT:
             return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
         if self.kind in (FaultKind.STEP, FaultKind.SLIP):
-            return f"the head slipped by {abs(np.degrees(self.sizes[0])):.0f} deg, or the compass stepped,"
+            return slip_text(self.sizes[0])
         return f"the compass errs by up to {np.degrees(size):.0f} deg by the heading: iron beside it"
 
     def is_beyond(self, end: float) -> bool:
@@ -80,6 +80,11 @@ class MotionFault:
         return Track(track.times, integrated(np.append(track.poses[0, :2], yaws[0]), steps))
 
 
+def slip_text(turn: float) -> str:
+    """Return what a turn [rad] means that the head made, or the heading, and that neither told."""
+    return f"the head slipped by {abs(np.degrees(turn)):.0f} deg, or the compass stepped,"
+
+
 def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
     """Return poses (m, 3) from `start` (3,) on by `steps` (m - 1, 3), each in the vehicle's frame."""
     yaws = start[2] + np.append(0.0, np.cumsum(steps[:, 2]))
@@ -98,9 +103,7 @@ _COLUMNS: Dict[FaultKind, Callable[[np.ndarray, np.ndarray, float], np.ndarray]]
     FaultKind.SLIP: _after,
     FaultKind.LENGTH: lambda times, _, __: np.ones((len(times), 1)),
     FaultKind.DISTANCES: _after,
-    FaultKind.CIRCLE: lambda _, yaws, __: np.column_stack(
-        [np.cos(yaws), np.sin(yaws), np.cos(2.0 * yaws), np.sin(2.0 * yaws)]
-    ),
+    FaultKind.CIRCLE: lambda _, yaws, __: harmonics(yaws),
 }
 """Of each kind what one unit of its sizes adds to headings (m,) reported at `times` (m,), (m, k)."""
 

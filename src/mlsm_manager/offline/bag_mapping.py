@@ -25,7 +25,7 @@ from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, od
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked
-from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, echo_findings
+from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings
 from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
@@ -70,7 +70,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     odometry = _odometry(recording, options)
     recording = recording.corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
-    recording, scans, of_echoes = _heard(recording, extractor, options)
+    recording, scans, mounted = _heard(recording, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     extracting = with_cells(extracting, scans, options.fixed)
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
@@ -87,12 +87,13 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
             refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
+    of_echoes = [*mounted, *echo_findings(scans, recording.sonar_in_base, replayed.corrections).causes]
     of_motion = [] if refined is None or of_echoes else refined.motion.causes
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
     causes = ranked([*causes, *of_echoes, *of_beams, *of_motion])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
-        findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(of_echoes))
+        findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
@@ -132,21 +133,19 @@ def _followed(
 def _heard(
     recording: Recording, extractor: EchoExtractor, options: Namespace
 ) -> Tuple[Recording, List[Scan], List[Cause]]:
-    """Return the recording with its mount put right where that is asked for, its scans, and what they tell is wrong."""
+    """Return the recording with its mount put right where that is asked for, its scans, and what was put right."""
     scans = _scans(recording, extractor, options)
-    found = echo_findings(scans, recording.sonar_in_base)
-    if not options.fix_mount or found.mount == AS_TOLD:
-        return recording, scans, found.causes
+    found = echo_findings(scans, recording.sonar_in_base) if options.fix_mount else EchoFindings([], AS_TOLD)
+    if found.mount == AS_TOLD:
+        return recording, scans, []
     mounted = recording.mounted(found.mount.turn, found.mount.is_over)
-    scans = _scans(mounted, extractor, options)
-    mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes[:1]]
-    return mounted, scans, [*mended, *echo_findings(scans, mounted.sonar_in_base).causes]
+    mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes]
+    return mounted, _scans(mounted, extractor, options), mended
 
 
-def _assumed_mount(of_echoes: Sequence[Cause]) -> str:
+def _assumed_mount(mended: Sequence[Cause]) -> str:
     """Return that the mount was put right by the echoes, if it was: to some degrees only, of which no check tells."""
-    is_mended = any(cause.is_mended for cause in of_echoes)
-    return "the mount is as the echoes tell it, to some degrees; correct tf and map again" if is_mended else ""
+    return "the mount is as the echoes tell it, to some degrees; correct tf and map again" if mended else ""
 
 
 def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:

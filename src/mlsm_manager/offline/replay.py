@@ -15,9 +15,10 @@ from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay_parameters import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.map_file import StoredMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed
+from node_support.geometry import composed, inverse
 
 ODOMETRY = "dead_reckoning"
 CORRECTED = "corrected"
@@ -64,6 +65,15 @@ class Replayed:
     def matched(self) -> int:
         """Scans whose match was accepted."""
         return sum(update.accepted and update.result is not None for update in self.updates)
+
+    @property
+    def corrections(self) -> Optional[Track]:
+        """T_map_odom at the ends of the scans, as known then; None where a scan has no belief."""
+        if any(update.belief is None for update in self.updates):
+            return None
+        ends = np.array([update.scan.reference_time for update in self.updates])
+        found = [composed(one.belief.theta[POSE], inverse(one.scan.reference_pose)) for one in self.updates]
+        return Track(ends, np.array(found))
 
     @property
     def found_again(self) -> List[str]:

@@ -1,22 +1,25 @@
 """Names what is wrong with mounts, stamps and head: the hypothesis under which scans lie closest to each other."""
 
-from dataclasses import dataclass
-from typing import List, NamedTuple, Sequence
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.odometry.faults import slip_text
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.causes import Cause, ranked
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
 _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
 _DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
-_SLIP_TOLD = np.radians(15.0)  # what half a run's scans tell to three deviations
-_NATS, _SLIP_NATS = 12.0, 6.0  # evidence from which on a cause is named; of a slip both sides must agree besides
-_ARM_NATS = 5.0  # an arm shows only in turns; no unbroken run had 5 nats for one above a metre
-_ONE_SIDE = 8  # scans before and after a slip that begin a pair: of fewer an unbroken run has had a slip by chance
+_SLIP_TOLD = np.radians(12.0)  # three deviations of a compass that turns quickly, or in a gap of the odometry
+_SLIPS = np.radians(np.arange(-60.0, 61.0, 4.0))
+_FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
+_FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
+# Nats from which on a cause is named: one in a hundred runs has it, and 95 % are asked for. Besides, the more causes
+# are tried the likelier one fits by chance, by the logarithm of their number.
+_NATS = float(np.log(100.0 / 0.05))
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 
 
@@ -27,22 +30,22 @@ class EchoFindings(NamedTuple):
     mount: Hypothesis
 
 
-def echo_findings(scans: Sequence[Scan], sonar_in_base: np.ndarray) -> EchoFindings:
-    """Return what the scans of a run tell of mounts, stamps and head. sonar_in_base: (2,) m."""
-    pairs = ScanPairs(scans, sonar_in_base)
+def echo_findings(
+    scans: Sequence[Scan], sonar_in_base: np.ndarray, corrections: Optional[Track] = None
+) -> EchoFindings:  # fmt: skip
+    """Return what the scans of a run tell of mounts, stamps and head.
+
+    sonar_in_base: (2,) m. corrections: T_map_odom over time as a solver found it; None before there is one.
+    """
+    pairs = ScanPairs(scans, sonar_in_base, corrections)
     if not pairs.tell or not _reports_positions(scans):
         return EchoFindings([], AS_TOLD)
-    best, causes = _turned(pairs), []
-    turn = pairs.evidence(best)
-    told = turn.nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD)
-    base = best if turn.nats > _NATS else AS_TOLD
-    # Thrusters' distances may be off by a third, and the solver finds how far: that is no cause.
-    base = pairs.best(around(base, "scale", np.arange(0.6, 1.65, 0.05)))
-    if told:
-        causes.append(Cause(_turn_text(best), turn.nats, turn=TURN_DEVIATION if best.is_over else abs(best.turn)))
-    causes += _delayed(pairs, base)
-    causes += [] if told else [*_shifted(pairs, base), *_slipped(pairs, base)]
-    return EchoFindings(causes, best if told else AS_TOLD)
+    honest, best, tried = pairs.honest, *_turned(pairs)
+    nats = pairs.evidence(best, honest) - np.log(tried)
+    if nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD):
+        turn = TURN_DEVIATION if best.is_over else abs(best.turn)
+        return EchoFindings([Cause(_turn_text(best), nats, turn=turn)], best)
+    return EchoFindings([*_delayed(pairs, honest), *_shifted(pairs, honest), *_slipped(pairs)], AS_TOLD)
 
 
 def _reports_positions(scans: Sequence[Scan]) -> bool:
@@ -50,10 +53,12 @@ def _reports_positions(scans: Sequence[Scan]) -> bool:
     return any(np.ptp(scan.track.poses[:, :2], axis=0).any() for scan in scans)
 
 
-def _turned(pairs: ScanPairs) -> Hypothesis:
+def _turned(pairs: ScanPairs) -> Tuple[Hypothesis, int]:
+    """Return the likeliest mount, and how many were tried."""
     angles = np.arange(-np.pi, np.pi, _COARSE)
-    coarse = pairs.best(Hypothesis(turn=float(turn), is_over=over) for over in (False, True) for turn in angles)
-    return pairs.best(around(coarse, "turn", coarse.turn + _FINE * np.arange(-4, 5)))
+    tried = [Hypothesis(turn=float(turn), is_over=over) for over in (False, True) for turn in angles]
+    coarse = pairs.best(tried)
+    return pairs.best(around(coarse, "turn", coarse.turn + _FINE * np.arange(-4, 5))), len(tried)
 
 
 def _turn_text(found: Hypothesis) -> str:
@@ -67,9 +72,10 @@ def _turn_text(found: Hypothesis) -> str:
     return side if abs(turn) < np.degrees(_TURN_TOLD) else f"{side}; it is {angle} besides"
 
 
-def _delayed(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
-    found = pairs.best(around(base, "delay", np.arange(-12.0, 12.5, 1.0)))
-    nats = pairs.evidence(found, base).nats
+def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
+    tried = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
+    found = pairs.best(tried)
+    nats = pairs.evidence(found, honest) - np.log(len(tried))
     if abs(found.delay) <= _DELAY_TOLD or nats < _NATS:
         return []
     side = "later" if found.delay > 0.0 else "earlier"
@@ -77,40 +83,32 @@ def _delayed(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
     return [Cause(text, nats, metres=1.0)]
 
 
-def _shifted(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
+def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     """Return whether the sonar sits elsewhere than tf says."""
-    steps = np.arange(-4.0, 4.1, 0.5)
-    ahead = pairs.best(around(base, "ahead", steps))
+    steps = np.arange(-4.0, 4.1)
+    ahead = pairs.best(around(AS_TOLD, "ahead", steps))
     found = pairs.best(around(ahead, "aside", steps))
-    size, nats = float(np.hypot(found.ahead, found.aside)), pairs.evidence(found, base).nats
-    if size < _ARM_TOLD or nats < _ARM_NATS:
+    size, nats = float(np.hypot(found.ahead, found.aside)), pairs.evidence(found, honest) - np.log(2 * len(steps))
+    if size < _ARM_TOLD or nats < _NATS:
         return []
     text = f"the sonar sits {found.ahead:+.1f} m ahead and {found.aside:+.1f} m to the left of where tf says"
     return [Cause(text, nats, metres=size)]
 
 
-def _slipped(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
-    """Return whether the sonar's turn changed in mid-run."""
-    turns = base.turn + _FINE * np.arange(-11, 12)
-    table, times = np.array([pairs.distances(one) for one in around(base, "turn", turns)]), pairs.times
-    common, best = table[int(table.mean(axis=1).argmin())], None
-    for moment in np.unique(times[:, 1]):
-        sides = times[:, 1] <= moment, times[:, 0] >= moment - 1.0
-        if min(len(np.unique(times[side, 0])) for side in sides) < _ONE_SIDE:
+def _slipped(pairs: ScanPairs) -> List[Cause]:
+    """Return whether scans lie turned on those before a moment, and not on those after it."""
+    near, found = pairs.near(), []
+    for number, begin in enumerate(near.begins):
+        across, before = (near.pairs[:, 0] < number) & (near.pairs[:, 1] >= number), near.pairs[:, 1] < number
+        if across.sum() < _FEWEST_SLIPPED or before.sum() < _FEWEST_BEFORE:
             continue
-        rows = [int(table[:, side].mean(axis=1).argmin()) for side in sides]
-        nats = [evidence_of(common[side] - table[row, side], times[side, 0]).nats for row, side in zip(rows, sides)]
-        slip = float(turns[rows[1]] - turns[rows[0]])
-        if abs(slip) > _SLIP_TOLD and (best is None or sum(nats) > best.nats):
-            best = _Slip(float(sum(nats)), float(moment), slip)
-    if best is None or best.nats < _SLIP_NATS:
-        return []
-    text = f"the head slipped by about {abs(np.degrees(best.slip)):.0f} deg, or the compass stepped,"
-    return [Cause(text, best.nats, best.moment, turn=abs(best.slip))]
-
-
-@dataclass(frozen=True)
-class _Slip:
-    nats: float
-    moment: float
-    slip: float
+        apart, alike = near.distances[across], near.distances[before]
+        if apart.mean() < _FARTHER * alike.mean():
+            continue
+        table = pairs.turned(near.pairs[across], _SLIPS)
+        row = int(table.mean(axis=1).argmin())
+        nats = evidence_of(apart, table[row], len(np.unique(near.pairs[across, 1])), alike)
+        nats -= np.log(len(near.begins) * len(_SLIPS))
+        if nats > _NATS and abs(_SLIPS[row]) > _SLIP_TOLD:
+            found.append(Cause(slip_text(_SLIPS[row]), nats, float(begin), turn=abs(_SLIPS[row])))
+    return ranked(found)[:1]

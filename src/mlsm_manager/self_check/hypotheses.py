@@ -1,20 +1,26 @@
-"""Causes found by trying: under the right hypothesis about mounts and odometry, scans lie on each other."""
+"""Causes found by trying: under the right hypothesis about mounts and odometry, scans lie on each other.
+
+Honest errors come first: what currents, scales and compasses do the solver's path shows, which every cause must beat.
+"""
 
 from dataclasses import dataclass, replace
-from typing import Dict, Iterable, List, NamedTuple, Sequence, Tuple
+from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import composed, inverse, transformed
+from node_support.geometry import composed, inverse, rotated, transformed
 
 _MOST, _FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
 _PAIRS, _FEWEST_PAIRS = 60, 10  # pairs of scans, spread over the run: more tell nothing new, fewer nothing
 _APART = (1, 2, 3)  # scans between the two of a pair: far enough apart that the vehicle moved
 _MOVED = 2.0  # m, or rad times 10 m: by less the scans lie on each other whatever is wrong
 _FAR = 4.0  # m: echoes that are farther from all others say no more than that something else is heard
-_LEAST_NOISE = 1e-3  # m
+_NOISE = 0.2  # m: by less no two scans of one place lie closer, and nothing follows from that
+_MOST_TOLD = 20.0  # independent distances in a scan, however alike the pairs are
+_LATE = np.arange(-1.0, 3.0)  # s: delays that a head may have with nothing wrong
+_SCALES = np.arange(0.6, 1.65, 0.1)  # of distances that thrusters report
 
 
 @dataclass(frozen=True)
@@ -22,7 +28,7 @@ class Hypothesis:
     """What may be wrong. turn: rad, of the sonar against tf, counter-clockwise. is_over: it hangs the other way round.
 
     ahead, aside: m, of the sonar's true place from that in tf. scale: true over reported distances. delay: s by which
-    beams are later than their stamps.
+    beams are later than their stamps. as_solved: the vehicle went as the solver found it, not as the odometry says.
     """
 
     turn: float = 0.0
@@ -31,16 +37,10 @@ class Hypothesis:
     aside: float = 0.0
     scale: float = 1.0
     delay: float = 0.0
+    as_solved: bool = False
 
 
 AS_TOLD = Hypothesis()
-
-
-class Evidence(NamedTuple):
-    """nats: over the other hypothesis. gain: m, by which scans lie closer."""
-
-    nats: float
-    gain: float
 
 
 class _Heard(NamedTuple):
@@ -57,9 +57,11 @@ class _Heard(NamedTuple):
 class ScanPairs:
     """Pairs of scans, and how far they lie apart under a hypothesis."""
 
-    def __init__(self, scans: Sequence[Scan], sonar_in_base: np.ndarray) -> None:
-        """sonar_in_base: (2,) m, by tf."""
-        self._sonar = sonar_in_base
+    def __init__(
+        self, scans: Sequence[Scan], sonar_in_base: np.ndarray, corrections: Optional[Track] = None
+    ) -> None:  # fmt: skip
+        """sonar_in_base: (2,) m, by tf. corrections: T_map_odom as the solver found it; None where none did yet."""
+        self._sonar, self._corrections = sonar_in_base, corrections
         self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= _FEWEST]
         self._pairs = self._chosen()
         self._known: Dict[Hypothesis, np.ndarray] = {}
@@ -99,26 +101,67 @@ class ScanPairs:
     def _placed(self, heard: _Heard, hypothesis: Hypothesis) -> np.ndarray:
         signs = np.array([1.0, -1.0 if hypothesis.is_over else 1.0])
         mount = np.array([self._sonar[0] + hypothesis.ahead, self._sonar[1] + hypothesis.aside, hypothesis.turn])
-        poses = heard.track.at(heard.times + hypothesis.delay) * [hypothesis.scale, hypothesis.scale, 1.0]
+        times = heard.times + hypothesis.delay
+        poses = heard.track.at(times) * [hypothesis.scale, hypothesis.scale, 1.0]
+        if hypothesis.as_solved:
+            poses = composed(self._corrections.at(times), poses)
         return transformed(composed(poses, mount), heard.points * signs)
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
         """Return the hypothesis under which scans lie closest."""
         return min(tried, key=lambda one: float(self.distances(one).mean()))
 
-    def evidence(self, hypothesis: Hypothesis, other: Hypothesis = AS_TOLD) -> Evidence:
-        """Return what speaks for a hypothesis against another."""
-        return evidence_of(self.distances(other) - self.distances(hypothesis), self.times[:, 0])
+    @property
+    def honest(self) -> Hypothesis:
+        """The likeliest of those with which nothing is wrong."""
+        if self._corrections is None:
+            return self.best(around(AS_TOLD, "scale", _SCALES))
+        return self.best([AS_TOLD, *around(Hypothesis(as_solved=True), "delay", _LATE)])
+
+    def evidence(self, hypothesis: Hypothesis, other: Hypothesis) -> float:
+        """Return what speaks for a hypothesis against another, nats."""
+        return evidence_of(self.distances(other), self.distances(hypothesis), len(np.unique(self.times[:, 0])))
+
+    def near(self) -> "NearPairs":
+        """Return all pairs of scans up to three apart, as they lie if nothing is wrong."""
+        numbers = range(len(self._heard))
+        pairs = [(one, one + apart) for apart in _APART for one in numbers[:-apart]]
+        placed = [self._placed(one, self.honest) for one in self._heard]
+        trees = [cKDTree(places) for places in placed]
+        apart = [np.minimum(trees[one].query(placed[other])[0], _FAR).mean() for one, other in pairs]
+        begins = np.array([one.times[0] for one in self._heard])
+        return NearPairs(np.array(pairs).reshape(-1, 2), begins, np.array(apart))
+
+    def turned(self, pairs: np.ndarray, turns: np.ndarray) -> np.ndarray:
+        """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) is turned by `turns` (k,)."""
+        table = np.empty((len(turns), len(pairs)))
+        for column, (one, other) in enumerate(pairs):
+            tree, later = cKDTree(self._placed(self._heard[one], AS_TOLD)), self._heard[other]
+            centre = later.track.at(later.times[-1])[:2]
+            late = self._placed(later, AS_TOLD) - centre
+            places = [rotated(late, np.full(len(late), turn)) + centre for turn in turns]
+            table[:, column] = [np.minimum(tree.query(place)[0], _FAR).mean() for place in places]
+        return table
 
 
-def evidence_of(gains: np.ndarray, begins: np.ndarray) -> Evidence:
-    """Return what the gains (p,) [m] of pairs tell: half the squared mean over its standard error.
+class NearPairs(NamedTuple):
+    """pairs: (p, 2) numbers of scans. begins: (n,) s, of all scans. distances: (p,) m between those of each pair."""
 
-    begins: (p,) s, of the first scan of each pair. Pairs that share it tell the same: the number of scans counts.
+    pairs: np.ndarray
+    begins: np.ndarray
+    distances: np.ndarray
+
+
+def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Optional[np.ndarray] = None) -> float:
+    """Return by how much (nats) distances `closer` (p,) [m] are likelier than `apart` (p,) that another cause leaves.
+
+    Mean distances of scans are taken to be distributed as gamma, with a mean that nobody knows, as the water tells it.
+    Echoes of a scan hang together: as many are independent as the spread of `alike` says (by default of `closer`), and
+    pairs that share a scan tell the same, so that `scans` count.
     """
-    gain = float(gains.mean())
-    noise = max(float(gains.std()) / np.sqrt(len(np.unique(begins))), _LEAST_NOISE)
-    return Evidence(0.5 * (max(gain, 0.0) / noise) ** 2, gain)
+    usual = closer if alike is None else alike
+    told = float(np.clip((usual.mean() / max(usual.std(), 1e-9)) ** 2, 1.0, _MOST_TOLD))
+    return scans * told * float(np.log((apart.mean() + _NOISE) / (closer.mean() + _NOISE)))
 
 
 def _heard(scan: Scan, sonar_in_base: np.ndarray) -> _Heard:

@@ -11,10 +11,11 @@ from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, of_steps, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.standing import standing_causes
+from node_support.geometry import composed, inverse
 
-_NEWEST = 30  # scans that are compared: with 20 an unbroken marina was once said to have a slipping head
-_FEWEST = 15  # scans: of ten, unbroken tours have been said to have the sonar upside down
-_BETWEEN = 5  # scans between two looks: a look takes most of a second of a core
+_NEWEST = 30  # scans that are compared
+_FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
+_BETWEEN = 3  # scans between two looks: a look takes most of a second of a core
 _MOST_PLACES = 20000  # four days of scans of 16 s
 
 
@@ -31,14 +32,16 @@ class LiveCauses:
         with self._lock:
             self._scans: Deque[Scan] = deque(maxlen=_NEWEST)
             self._places: Deque[Tuple[float, float, float]] = deque(maxlen=_MOST_PLACES)
+            self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
             self._new = 0
             self._found: List[Cause] = []
 
-    def take(self, scan: Scan, place: np.ndarray) -> None:
-        """Learn a scan, whose odometry does not jump, and where the vehicle was at its end, (2,) m."""
+    def take(self, scan: Scan, pose: np.ndarray) -> None:
+        """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
         with self._lock:
             self._scans.append(scan)
-            self._places.append((scan.reference_time, float(place[0]), float(place[1])))
+            self._corrections.append(composed(pose, inverse(scan.reference_pose)))
+            self._places.append((scan.reference_time, float(pose[0]), float(pose[1])))
             self._new += 1
 
     def look(self) -> None:
@@ -47,7 +50,8 @@ class LiveCauses:
             if self._new < _BETWEEN or len(self._scans) < _FEWEST:
                 return
             self._new, scans, places = 0, list(self._scans), self._places
-        found = [*echo_findings(scans, self.sonar_in_base).causes, *standing_causes(scans, _track(scans))]
+            corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
+        found = [*echo_findings(scans, self.sonar_in_base, corrections).causes, *standing_causes(scans, _track(scans))]
         with self._lock:
             if self._places is places:
                 self._found = found

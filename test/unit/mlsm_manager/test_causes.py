@@ -81,7 +81,7 @@ def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
         (broken.mount_turned(WHOLE, 180.0), "the sonar is turned by"),
         (broken.mount_turned(WHOLE, -45.0), "the sonar is turned by -4"),
         (broken.mount_upside_down(WHOLE), "the sonar is upside down"),
-        (broken.head_slips(WHOLE, MIDDLE, 40.0), "the head slipped by about"),
+        (broken.head_slips(WHOLE, MIDDLE, 40.0), "the head slipped by "),
         (broken.delayed(WHOLE, 8.0), "beams were sent"),
     ],
 )
@@ -144,7 +144,7 @@ def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
 def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(recording, said):
     live = LiveCauses()
     for scan in scans_in(recording):
-        live.take(scan, scan.reference_pose[:2])
+        live.take(scan, scan.reference_pose)
     live.look()
     assert [cause.text[: len(text)] for cause, text in zip(live.causes([]), said)] == said
     assert (np.trace(live.covariance([])) > 0.25) == bool(said)

@@ -5,15 +5,17 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from made_harbour import CANAL, ahead, along_canal, deaf, reporting, selected, tour
-from made_models import followed
+from made_models import COMPASS, followed
 
 from mlsm_manager.joint_solver.batch_solver import solved
 from mlsm_manager.joint_solver.estimate import scale_covariance
-from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations
+from mlsm_manager.joint_solver.heading_errors import by_heading
+from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, solution_of
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import harmonics
 
 pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the solver and its parts are tested with every version")]
 
@@ -192,3 +194,26 @@ def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
     batch = solved(followed(scans, parameters(OdometryKind.HEADING, free_scans=5)))
     assert batch.converged
     assert batch.steps < 15
+
+
+def test_a_compass_that_errs_by_the_heading_is_an_unknown_that_is_eliminated():
+    nodes, durations = np.arange(10), np.full(9, 14.0)
+    yaws, layout = np.random.RandomState(1).uniform(-3.0, 3.0, 10), Layout(0, 9, 3)
+    change, columns = COMPASS.change(durations), layout.node_start(nodes) + YAW
+    errors = 2.0 * COMPASS.heading_deviation * harmonics(yaws) * [1.0, 1.0, 0.5, 0.5]
+    with_errors, without = NormalEquations(layout.size + 4), NormalEquations(layout.size)
+    for equations, count in ((with_errors, 4), (without, 0)):
+        own = np.tile(layout.size + np.arange(count), (10, 1))
+        kept = change.kept[:, np.newaxis]
+        steps = np.column_stack([np.ones(9), -change.kept, (errors[1:] - kept * errors[:-1])[:, :count]])
+        places = np.column_stack([columns[1:], columns[:-1], own[1:]])
+        equations.add(places, steps, np.zeros(9), 1.0 / change.variance)
+        first = np.append(1.0, errors[0, :count])[np.newaxis]
+        start = np.append(columns[0], own[0])[np.newaxis]
+        equations.add(start, first, np.zeros(1), np.array([COMPASS.heading_deviation**-2.0]))
+        unknowns = np.arange(layout.size + count)
+        told = np.where(unknowns < layout.size, 0.03, 1.0)  # by the echoes, and of errors of one beforehand
+        equations.add_prior(unknowns, np.zeros(len(unknowns)), np.zeros(len(unknowns)), told)
+    found = by_heading(COMPASS, layout, yaws, durations, solution_of(without).solve)
+    covariance = np.linalg.inv(with_errors.dense()[0])[: layout.size, : layout.size]
+    np.testing.assert_allclose(np.linalg.inv(without.dense()[0]) + found @ found.T, covariance, atol=1e-9)
