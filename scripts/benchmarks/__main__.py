@@ -21,7 +21,19 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "chain": chain_figures.rows,
     "simulation": simulation_figures.rows,
 }
-STUDIES = ("autopilot", "canals", "chart", "faults", "link", "logs", "long_run", "no_parameters", "silence", "web")
+STUDIES = (
+    "autopilot",
+    "canals",
+    "chart",
+    "faults",
+    "link",
+    "logs",
+    "long_run",
+    "no_parameters",
+    "silence",
+    "web",
+    "workers",
+)
 
 
 def main() -> None:

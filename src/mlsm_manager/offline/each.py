@@ -58,18 +58,19 @@ def options_of_one(arguments: Sequence[str], recordings: Sequence[Path]) -> List
 
 
 def map_each(
-    recordings: Sequence[Path], out: Path, options: Sequence[str], scheduler: Optional[str] = None
-) -> List[Outcome]:
+    recordings: Sequence[Path], out: Path, options: Sequence[str], scheduler: Optional[str] = None,
+    at_once: Optional[int] = None,
+) -> List[Outcome]:  # fmt: skip
     """Map each recording as `map_bag RECORDING --out FOLDER` with `options` does; what is there stays.
 
-    They run on all cores, or on the Dask cluster at the address `scheduler`, whose workers see the same folders. The
-    index is written anew after each of them. Raises OSError where `out` cannot be written, and RecordingError where
-    the cluster cannot be used, or is lost.
+    They run `at_once`, by default as many as there are cores, or on the Dask cluster at the address `scheduler`, whose
+    workers see the same folders. The index is written anew after each of them. Raises OSError where `out` cannot be
+    written, and RecordingError where the cluster cannot be used, or is lost.
     """
     make_folder(out)
     jobs = _jobs(recordings, out)
     outcomes: Dict[Job, Outcome] = {}
-    with ThreadPoolExecutor(os.cpu_count()) if scheduler is None else Cluster(scheduler, out) as workers:
+    with ThreadPoolExecutor(at_once or os.cpu_count()) if scheduler is None else Cluster(scheduler, out) as workers:
         running = {workers.submit(_mapped, job, options) for job in jobs}
         try:
             while running:

@@ -20,7 +20,7 @@ from sonar_processing.filters.echo_peaks import Peaks, find_peaks, leading_edges
 from sonar_processing.filters.echo_shape import EchoShape, EchoStatistics
 from sonar_processing.filters.threshold import otsu_threshold
 
-FEWEST_BEAMS = 10  # Fewer directions tell no quantile over them
+FEWEST_BEAMS = 6  # Fewer directions tell no quantile over them
 _SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it is sampled
 _SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do not count as spread
 _SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included

@@ -194,8 +194,8 @@ def test_the_order_of_the_beams_makes_no_difference():
 
 
 def test_too_few_beams_show_no_ring():
-    with pytest.raises(RefusedInput, match=r"^9, must be at least 10") as refused:
-        _echoes(wall_image(WALL[:9]))
+    with pytest.raises(RefusedInput, match=r"^5, must be at least 6") as refused:
+        _echoes(wall_image(WALL[:5]))
     assert refused.value.kind == "scans of too few beams"
 
 
