@@ -6,7 +6,7 @@ import threading
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable
+from typing import Any, Callable, Set
 
 from tornado.httpserver import HTTPServer
 from tornado.ioloop import IOLoop
@@ -57,7 +57,7 @@ class PageServer:
         self.port = sockets[0].getsockname()[1]
         shared = {"served": served, "parameters": parameters}
         routes = [
-            ("/live", _Live, shared),
+            ("/live", _Live, {**shared, "opened": set()}),
             ("/marks.geojson", _Chart, shared),
             ("/(.*)", _File, {"path": str(folder), "default_filename": "index.html"}),
         ]
@@ -101,9 +101,9 @@ class _Chart(RequestHandler):
 class _Live(WebSocketHandler):
     """One page that is open: gets what is new as fast as it takes it, and may set marks."""
 
-    def initialize(self, served: Served, parameters: WebPageParameters) -> None:
-        """Remember what is served."""
-        self._served, self._parameters = served, parameters
+    def initialize(self, served: Served, parameters: WebPageParameters, opened: Set["_Live"]) -> None:
+        """Remember what is served; opened: all pages that are open."""
+        self._served, self._parameters, self._opened = served, parameters, opened
         self._queue = ThinQueue(parameters.bytes_per_second)
         self._is_fed, self._next_request = False, 0.0
 
@@ -114,7 +114,8 @@ class _Live(WebSocketHandler):
     def open(self, *_: Any) -> None:
         """Refuse a page where enough are open."""
         self.set_nodelay(True)
-        if self._served.board.pages >= self._parameters.most_pages:
+        self._opened.add(self)
+        if len(self._opened) > self._parameters.most_pages:
             self.close(_TOO_MANY, f"{self._parameters.most_pages} pages are open, which is most_pages")
 
     async def on_message(self, message: Any) -> None:
@@ -169,4 +170,5 @@ class _Live(WebSocketHandler):
 
     def on_close(self) -> None:
         """Forget the page."""
+        self._opened.discard(self)
         self._served.board.close(self._queue)

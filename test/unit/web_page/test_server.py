@@ -10,6 +10,7 @@ from tornado.websocket import websocket_connect
 
 from node_support.errors import RefusedInput
 from node_support.files import package_folder
+from node_support.marks import Mark
 from web_page.board import WORDS, Board
 from web_page.messages import SetMark
 from web_page.parameters import WebPageParameters
@@ -71,10 +72,15 @@ def test_nothing_can_be_posted(site):
 def test_a_page_gets_what_is_new_and_may_set_a_mark(site):
     site.board.put("words", '{"words":1}', WORDS)
     assert site.talk(HELLO) == ['{"words":1}']
-    mark = '{"mark": {"name": "block", "x": 1, "y": 2}}'
-    refused = site.talk(mark, mark)
-    assert [type(one) for one in site.asked] == [SetMark]
-    assert "more than one" in json.loads(refused[0])["refused"]
+    site.talk('{"mark": {"name": "block", "x": 1, "y": 2}}', "{}")
+    assert site.asked == [SetMark(Mark("block", 1, 2))]
+
+
+def test_a_page_that_asks_without_end_is_held_up(site):
+    site.asked.clear()
+    (refused,) = site.talk(*['{"delete": {"name": "block"}}'] * 200)
+    assert "more than one" in json.loads(refused)["refused"]
+    assert 0 < len(site.asked) < 200
 
 
 def test_what_is_no_request_is_refused_and_counted(site):
