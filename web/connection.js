@@ -1,6 +1,7 @@
 // The link to the vehicle: messages in, requests out. src/web_page/messages.py writes and reads the same.
 
 const SILENT = 3000;  // ms without a message: the link is cut
+const OPENING = 5000;  // ms until an attempt is given up
 const RETRY = 1000;   // ms between two attempts
 const TURN = 65536;   // steps of an angle of 16 bits
 
@@ -70,7 +71,8 @@ export class Connection {
 
   watch() {
     const waited = performance.now() - Math.max(this.opened, this.heard);
-    if (this.socket.readyState < WebSocket.CLOSING && waited < SILENT) return;
+    const patience = this.socket.readyState === WebSocket.CONNECTING ? OPENING : SILENT;
+    if (this.socket.readyState < WebSocket.CLOSING && waited < patience) return;
     const old = this.socket;
     this.socket = null;
     old.onclose = null;
