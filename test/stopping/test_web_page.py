@@ -18,7 +18,6 @@ from selenium.webdriver.chrome.options import Options  # noqa: E402
 from selenium.webdriver.chrome.service import Service  # noqa: E402
 
 OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--window-size=1000,700")
-BACK = 10.0  # s from the end of a cut until all is there again
 # The darkest blue (0 to 255) that is drawn within a metre of a point of the map.
 DARKEST = """
 window.darkest = (point) => {
@@ -168,8 +167,8 @@ def test_6_a_cut_link_is_told_and_all_is_there_again_after_it(site):
     assert site.run("return page.model.tiles.size") > 0
     site.start_page()
     site.wait("!page.connection.isCut")
-    site.wait("page.model.revision && page.model.tiles.size && page.model.marks.length", BACK)
-    site.wait("page.model.now?.waiting === ''", BACK)
+    site.wait("page.model.revision && page.model.tiles.size && page.model.marks.length")
+    site.wait("page.model.now?.waiting === ''")
 
 
 def test_7_it_survives_a_restarted_master(site):
