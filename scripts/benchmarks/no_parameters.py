@@ -40,6 +40,7 @@ _DRAWN = {
     "compass 2 deg off and drifting": {"heading_deviation": 0.035, "heading_walk": 0.001},
 }
 """What is wrong with an odometry of DVL and compass besides its usual errors; of these rows NEES should be 1."""
+_GOES_AND_STANDS = (15.0, 5.0)  # s, mean durations
 _MOVES, _STARTS = "thesis's three moves, 30 % off", 30
 _HEADING = np.array([0.0, 0.0, 1.0])
 _COLUMNS = ("live", "refined", "shape", "NEES", "refined", "stated", "refined", "ms", "odometry found")
@@ -72,6 +73,7 @@ def rows() -> Dict[str, Row]:
         "marina_first, compass alone": Row(partial(_marina, _HEADING), 1),
         **dict(_scaled_rows()),
         **{f"{tour}, {what}": Row(partial(_drawn, tour, _DRAWN[what])) for what in _DRAWN for tour in TOURS},
+        **{f"{tour}, odometry stalls for 5 s": Row(partial(_stalled, tour)) for tour in TOURS},
         **{f"{tour}, compass alone": Row(partial(_compass, tour)) for tour in TOURS},
         **{f"{world}, {kind}": Row(partial(_head, world, kind)) for world in ("basin", "harbour") for kind in KINDS},
         **{f"twin {name}": Row(partial(_twin, name), 1) for name in TWINS},
@@ -102,6 +104,16 @@ def _drawn(tour: str, errors: Dict[str, float], seed: int) -> Recording:
     sound = np.random.RandomState(1000 + seed).normal(0.0, _SOUND)
     recording = simulated(f"{tour}_tour").with_dvl(seed, **errors)
     return recording.corrected(BeamCorrection(range_scale=1.0 / (1.0 + sound)))
+
+
+def _stalled(tour: str, seed: int) -> Recording:
+    """Return the recording of an odometry whose positions stand for some seconds, a quarter of the time."""
+    recording = _drawn(tour, {}, seed)
+    times, poses = recording.track.times, recording.track.poses.copy()
+    changes = np.cumsum(np.random.RandomState(2000 + seed).exponential(np.tile(_GOES_AND_STANDS, len(times))))
+    goes = np.searchsorted(changes, times[1:] - times[0]) % 2 == 0
+    poses[1:, :2] = poses[0, :2] + np.cumsum(np.diff(poses[:, :2], axis=0) * goes[:, np.newaxis], axis=0)
+    return recording.with_track(Track(times, poses))
 
 
 def _head(world: str, kind: SonarKind, seed: int) -> Recording:

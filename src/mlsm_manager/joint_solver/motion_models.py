@@ -24,6 +24,7 @@ _CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far belo
 # Of an odometry with which something is wrong: rad, s within which a compass may err otherwise as the vehicle turns,
 # relative and 1/sqrt(s): distances are known as a DVL's at first and may be wrong by half two minutes later.
 _FREED_HEADING, _FREED_TIME, _FREED_SCALE, _FREED_SCALE_WALK = 0.15, 60.0, 0.09, 0.025
+_HELD_SPEED = 0.3  # m/s: the usual one of a small vehicle
 _ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not divide by zero
 
 
@@ -265,7 +266,7 @@ class DvlFactors(OdometryModel):
     def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
         starts = layout.node_start(np.arange(layout.first, layout.last))
         durations = motion.durations
-        self._add_positions(equations, starts, nodes, np.diff(motion.positions), durations)
+        self._add_positions(equations, starts, nodes, motion)
         add_changes(equations, starts, nodes, self._changes(durations))
 
     def _changes(self, durations: np.ndarray) -> Changes:
@@ -277,21 +278,21 @@ class DvlFactors(OdometryModel):
             SCALE: walk(0.0, durations),
         }
 
-    def _add_positions(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, step: np.ndarray, durations: np.ndarray
-    ) -> None:
-        """Add the steps; step: (n,) x + i y [m] as reported.
+    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        """Add the steps. While positions are held nobody knows how far the vehicle goes.
 
         Noise is one of the reported velocities, so the residuals are those per unit of scale. The derivative by the
         scale contains that; else the fit would shrink the world to make them smaller.
         """
+        step, durations = np.diff(motion.positions), motion.durations
         one = np.ones(len(starts))
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         turned_step = product(turned(nodes[:-1, DIRECTION] + yaw), step)
         scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
         change = np.diff(as_complex(nodes))
         residual = change - (scaled - step) - self._carried(nodes[:-1], durations)
-        weight = 1.0 / (self._parameters.position_walk**2 * durations + _ROUNDING_VARIANCE)
+        unknown = (_HELD_SPEED * np.diff(motion.held)) ** 2
+        weight = 1.0 / (self._parameters.position_walk**2 * durations + unknown + _ROUNDING_VARIANCE)
         for axis, part in ((0, np.real), (1, np.imag)):
             places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *self._carriers(axis))
             by_angle = -part(1j * scaled)

@@ -11,6 +11,7 @@ from node_support.geometry import composed, inverse
 _FIRST_CAPACITY = 256
 _GROWTH = 5  # quarters: memory of a long run is dearer than copying
 _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
+_HOLD = 2.0  # s without any move from which on a position is held: longer than a slow DVL waits between two velocities
 
 
 class GrowingArray:
@@ -85,7 +86,8 @@ class GrowingTable:
 class Motion:
     """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
 
-    positions: (m,) complex x + i y [m] in odom.
+    held: (m,) s, for how long until then positions did not change at all while the heading did: the odometry told
+    nothing, or the vehicle was at rest. positions: (m,) complex x + i y [m] in odom.
 
     "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
     """
@@ -93,6 +95,7 @@ class Motion:
     times: np.ndarray
     poses: np.ndarray
     ahead: np.ndarray
+    held: np.ndarray
     positions: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -103,7 +106,7 @@ class Motion:
 
     def __getitem__(self, rows: Union[slice, np.ndarray]) -> "Motion":
         """Return the motion at `rows`: a slice or an array of indices."""
-        return Motion(self.times[rows], self.poses[rows], self.ahead[rows])
+        return Motion(self.times[rows], self.poses[rows], self.ahead[rows], self.held[rows])
 
     @property
     def durations(self) -> np.ndarray:
@@ -115,7 +118,7 @@ class OdometryLog:
     """Poses T_odom_base of a run in the order of time; grows at its end, and yaw never jumps by a turn."""
 
     def __init__(self) -> None:
-        self._table = GrowingTable(times=(), poses=(3,), ahead=(2,))
+        self._table = GrowingTable(times=(), poses=(3,), ahead=(2,), held=())
 
     @classmethod
     def of(cls, track: Track) -> "OdometryLog":
@@ -152,7 +155,8 @@ class OdometryLog:
         if len(self):
             jump = poses[0, 2] - self._table["poses"][-1, 2]
             poses[:, 2] -= 2.0 * np.pi * np.round(jump / (2.0 * np.pi))
-        self._table.extend(times=times, poses=poses, ahead=self._gone_ahead(times, poses[:, 2]))
+        ahead, held = self._gone_ahead(times, poses[:, 2]), self._seconds_held(times, poses)
+        self._table.extend(times=times, poses=poses, ahead=ahead, held=held)
 
     def _gone_ahead(self, times: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Return where the newest (m,) poses are on the path of `Motion.ahead`, by the trapezoidal rule."""
@@ -164,6 +168,17 @@ class OdometryLog:
         steps = (heading[1:] + heading[:-1]) / 2.0 * np.diff(times)[:, np.newaxis]
         return start + np.cumsum(steps, axis=0)
 
+    def _seconds_held(self, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
+        """Return for how long (m,) [s] positions were held until each of the newest poses (m, 3); see Motion."""
+        near = slice(max(int(np.searchsorted(self._table["times"], times[0] - _HOLD)) - 1, 0), None)
+        known = self._table["times"][near]
+        all_times, all_poses = np.append(known, times), np.concatenate([self._table["poses"][near], poses])
+        before = np.searchsorted(all_times, times - _HOLD, side="right") - 1
+        moves = poses - all_poses[np.maximum(before, 0)]
+        is_held = (before >= 0) & (moves[:, :2] == 0.0).all(axis=1) & (moves[:, 2] != 0.0)
+        steps = np.diff(all_times, prepend=all_times[0])[len(known) :]
+        return self._table["held"][-1:].sum() + np.cumsum(np.where(is_held, steps, 0.0))
+
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""
         return _between(times, self._table["times"], self._table["poses"])
@@ -171,7 +186,7 @@ class OdometryLog:
     def between(self, start: float, end: float) -> Motion:
         """Return the known poses between `start` and `end` [s], and the nearest beyond both."""
         near = _around(self._table["times"], start, end)
-        return Motion(*self._table.chosen(near, "times", "poses", "ahead"))
+        return Motion(*self._table.chosen(near, "times", "poses", "ahead", "held"))
 
     def velocity_at(self, time: float) -> np.ndarray:
         """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
@@ -180,7 +195,9 @@ class OdometryLog:
 
     def motion(self, times: np.ndarray) -> Motion:
         """Return the motion at `times` (m,), as `at` does."""
-        return Motion(times, self.at(times), _between(times, self._table["times"], self._table["ahead"]))
+        known, held = self._table["times"], self._table["held"][:, np.newaxis]
+        ahead = _between(times, known, self._table["ahead"])
+        return Motion(times, self.at(times), ahead, _between(times, known, held)[..., 0])
 
 
 def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -22,7 +22,7 @@ pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the solver and it
 STEP = 1e-6
 TIMES = np.array([0.0, 14.0, 28.0])
 POSES = np.array([[0.0, 0.0, 0.0], [2.0, 0.0, 0.3], [3.0, 2.0, 0.5]])
-MOTION = Motion(TIMES, POSES, np.array([[0.0, 0.0], [13.5, 2.0], [26.0, 8.0]]))
+MOTION = Motion(TIMES, POSES, np.array([[0.0, 0.0], [13.5, 2.0], [26.0, 8.0]]), np.zeros(3))
 KINDS = list(OdometryKind)
 
 
@@ -99,7 +99,7 @@ def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
     nodes, positions = some_nodes(model), np.array([[5.0, 1.0], [-3.0, 9.0], [0.0, 4.0]])
     elsewhere = nodes.copy()
     elsewhere[:, :2] += POSES[:, :2] - positions
-    other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead)
+    other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead, MOTION.held)
     there = NormalEquations(Layout(0, 2, model.width).size)
     model.add_steps(there, Layout(0, 2, model.width), elsewhere, other)
     np.testing.assert_allclose(there.gradient, equations_of(model, nodes).gradient, rtol=1e-9, atol=1e-9)
@@ -120,6 +120,33 @@ def test_a_timeline_that_grows_piece_by_piece_goes_on_ahead():
     for end in (3.0, 3.05, 7.2, 10.0):
         pieces.extend(track, end)
     np.testing.assert_allclose(pieces.motion(times).ahead, OdometryLog.of(track).motion(times).ahead, atol=1e-12)
+
+
+def stalled(heading):
+    """Return the track of an odometry that stands still from 3 to 9 s; heading: rad per second."""
+    times = np.linspace(0.0, 12.0, 121)
+    moved = np.minimum(times, 3.0) + np.maximum(times - 9.0, 0.0)
+    return Track(times, np.column_stack([moved, 0.0 * times, heading * times]))
+
+
+@pytest.mark.parametrize(("heading", "held"), [(0.01, 4.0), (0.0, 0.0)])
+def test_positions_are_held_where_they_stand_while_the_heading_changes(heading, held):
+    """From two seconds on; where the heading stands too, the vehicle is at rest."""
+    track, pieces = stalled(heading), OdometryLog()
+    for end in (4.0, 4.05, 7.2, 12.0):
+        pieces.extend(track, end)
+    for log in (pieces, OdometryLog.of(track)):
+        np.testing.assert_allclose(log.motion(np.array([0.0, 5.0, 12.0])).held, [0.0, 0.0, held], atol=0.15)
+
+
+@pytest.mark.parametrize("kind", [OdometryKind.DVL, OdometryKind.THRUSTERS])
+def test_while_positions_are_held_nobody_knows_how_far_the_vehicle_goes(kind):
+    model = model_of(kind)
+    nodes = model.first_node() + np.array([[0.0], [4.0], [4.0]]) * np.eye(model.width)[0]
+    held = Motion(TIMES, POSES, MOTION.ahead, np.array([0.0, 14.0, 14.0]))
+    reported, told = NormalEquations(Layout(0, 2, model.width).size), equations_of(model, nodes)
+    model.add_steps(reported, Layout(0, 2, model.width), nodes, held)
+    assert told.cost > 5.0 * reported.cost
 
 
 @pytest.fixture(scope="module")
