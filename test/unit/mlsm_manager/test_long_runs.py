@@ -144,3 +144,7 @@ def test_scans_are_kept_for_storing_only_as_many_as_are_stored(monkeypatch):
         session.add(scan)
         assert session.may_be_stored == (number <= 5)
         assert len(session.scans) == (number if number <= 5 else 0)
+
+
+def test_no_scan_that_is_stored_with_a_run_is_forgotten():
+    assert solver_parameters().kept_scans >= joint_session._MOST_STORED
