@@ -29,7 +29,7 @@ from recordings.bags.bag_writer import BagWriter
 from recordings.satellite_fixes import satellite_fixes
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
-from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
+from sonar_processing.filters.echo_extractor import FEWEST_BEAMS, EchoExtractor, EchoExtractorParameters
 
 TIMES = np.arange(4.0)
 ODOMETRY_POSES = np.column_stack([TIMES, np.zeros(4), np.full(4, 4.0)])
@@ -227,7 +227,8 @@ def test_beams_beyond_the_odometry_count_as_unplaced(recording):
 
 @pytest.mark.parametrize(
     ("lengths", "scans"),
-    [((30, 63), [30, 63]), ((9, 63), [63]), ((30, 40), [30, 40]), ((63, 40), [63, 40]), ((63, 20), [63])],
+    [((30, 63), [30, 63]), ((FEWEST_BEAMS - 1, 63), [63])
+, ((30, 40), [30, 40]), ((63, 40), [63, 40]), ((63, 20), [63])],
 )
 def test_parts_of_turns_are_kept_before_a_change_of_the_range_and_if_long_at_the_end(lengths, scans):
     echo = 200 * (np.arange(100) == 50).astype(np.uint8)
