@@ -227,8 +227,13 @@ def test_beams_beyond_the_odometry_count_as_unplaced(recording):
 
 @pytest.mark.parametrize(
     ("lengths", "scans"),
-    [((30, 63), [30, 63]), ((FEWEST_BEAMS - 1, 63), [63])
-, ((30, 40), [30, 40]), ((63, 40), [63, 40]), ((63, 20), [63])],
+    [
+        ((30, 63), [30, 63]),
+        ((FEWEST_BEAMS - 1, 63), [63]),
+        ((30, 40), [30, 40]),
+        ((63, 40), [63, 40]),
+        ((63, 20), [63]),
+    ],
 )
 def test_parts_of_turns_are_kept_before_a_change_of_the_range_and_if_long_at_the_end(lengths, scans):
     echo = 200 * (np.arange(100) == 50).astype(np.uint8)
