@@ -28,6 +28,7 @@ _TRUTH = f"/{topics.GROUND_TRUTH}"
 _MCAP = ".mcap"
 _Writer = Union[BagWriter, McapWriter]
 _Stamped = Tuple[int, str, Any]  # ns, topic and message
+_LATEST_NS = 2**32 * 10**9 - 1  # the latest stamp that a bag of ROS 1 holds, of the year 2106
 
 
 def run_convert_bag() -> None:
@@ -69,12 +70,16 @@ def _parser() -> argparse.ArgumentParser:
 
 
 def write_converted(path: Path, content: Content, request: Request) -> None:
-    """Write beams, odometry, transforms and truth, whole or not at all. Raises OSError."""
+    """Write beams, odometry, transforms and truth, whole or not at all. Raises OSError, and RecordingError for a
+    stamp that a bag cannot hold.
+    """
     writer = McapWriter if path.suffix == _MCAP else BagWriter
     with whole_file(path) as temporary, writer(temporary) as bag:
         messages = [*_beams(bag, content.recorded.beams), *_motion(bag, content, request), *_truth(bag, content)]
         messages.sort(key=lambda one: one[0])
-        start = messages[0][0]
+        start, end = messages[0][0], messages[-1][0]
+        if start < 0 or end > _LATEST_NS:
+            raise RecordingError(f"{path}: stamps from {start} to {end} ns, must be from 0 to {_LATEST_NS}")
         bag.write(topics.STATIC_TRANSFORMS, _fixed_links(bag, content, start), start)
         for stamp_ns, topic, message in messages:
             bag.write(topic, message, stamp_ns)

@@ -85,6 +85,19 @@ def test_a_foreign_bag_is_converted_with_its_odometry_and_mount(foreign_bag, tmp
     assert recording.beams[0].T_target_sonar[0, 3] == pytest.approx(1.5)
 
 
+def test_a_stamp_that_no_bag_can_hold_is_refused_in_one_line(tmp_path):
+    damaged, out = tmp_path / "damaged.bag", tmp_path / "out.bag"
+    with foreign.of_beams(damaged) as bag:
+        foreign.add_odometry(bag)
+        late = foreign.stamped(bag, "nav_msgs/Odometry", foreign.END, "world")
+        late.header.stamp.sec, late.header.stamp.nanosec = 2**32 - 1, 2**32 - 1
+        late.child_frame_id = "hull"
+        bag.write("/nav/odometry", late, foreign.nanoseconds(foreign.END))
+    with pytest.raises(RecordingError, match="4294967299294967295 ns, must be from 0 to"):
+        convert_bag([str(damaged), str(out)])
+    assert not out.exists()
+
+
 def test_nothing_is_left_of_a_conversion_that_failed(tmp_path):
     with pytest.raises(RecordingError):
         convert_bag(["/no/such.bag", str(tmp_path / "out.bag")])
