@@ -9,6 +9,7 @@ from made_bags import write_mcap
 
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
+from recordings.bags.messages import Placing
 from recordings.bags.topic_roles import Role
 from recordings.convert_bag import convert_bag
 from recordings.reader import Request
@@ -88,12 +89,12 @@ def test_a_foreign_bag_is_converted_with_its_odometry_and_mount(foreign_bag, tmp
 def test_a_stamp_that_no_bag_can_hold_is_refused_in_one_line(tmp_path):
     damaged, out = tmp_path / "damaged.bag", tmp_path / "out.bag"
     with foreign.of_beams(damaged) as bag:
-        foreign.add_odometry(bag)
-        late = foreign.stamped(bag, "nav_msgs/Odometry", foreign.END, "world")
-        late.header.stamp.sec, late.header.stamp.nanosec = 2**32 - 1, 2**32 - 1
-        late.child_frame_id = "hull"
-        bag.write("/nav/odometry", late, foreign.nanoseconds(foreign.END))
-    with pytest.raises(RecordingError, match="4294967299294967295 ns, must be from 0 to"):
+        still = Placing(np.zeros(3), np.array([0.0, 0.0, 0.0, 1.0]))
+        for seconds in (foreign.START, -5.0):
+            transform = bag.transform(still, bag.time(foreign.nanoseconds(seconds)), "odom", "base_link")
+            bag.write("/tf", bag.transforms([transform]), foreign.nanoseconds(foreign.END))
+        foreign.add_fixed(bag, "base_link", "head")
+    with pytest.raises(RecordingError, match="stamps from -5000000000 to 110000000000 ns, must be from 0 to"):
         convert_bag([str(damaged), str(out)])
     assert not out.exists()
 
