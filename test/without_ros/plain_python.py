@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = ROOT / "build/plain"
-_SOURCES = ("nodes", "src", "urdf", "worlds", "yaml")
+_SOURCES = ("migration", "nodes", "src", "urdf", "web", "worlds", "yaml")
 _DESCRIPTIONS = ("README.md", "LICENSE", "package.xml", "pyproject.toml", "setup.py")
 
 
