@@ -43,8 +43,10 @@ def soak(options: argparse.Namespace, folder: Path) -> bool:
         listener = Listener()
         samples = _samples(graph, listener, folder)
         _wait_for_rest(listener)
-        table = rows(samples, listener)
+        table = rows(samples, listener, (folder / "roslaunch.log").read_text(errors="replace"))
         print_table([row[:3] for row in table])
+        for row in (row for row in table if not row.holds):
+            print(f"soak: {row.what}: {row.measured}, wanted {row.wanted}", file=sys.stderr)
         return all(row.holds for row in table)
     finally:
         graph.stop()

@@ -13,6 +13,8 @@ from nav_msgs.msg import Odometry
 from rosgraph_msgs.msg import Clock, Log
 from std_msgs.msg import Float32
 
+from node_support.ros.callbacks import INTERNAL_ERRORS
+
 COUNTED = {
     "/sonar/scan/echoes": (("echo_extractor", "clouds out"), ("mlsm_core", "scans in")),
     "/MLSM/pose": (("mlsm_core", "scans matched"),),
@@ -23,12 +25,16 @@ _DIGITS = re.compile(r"-?\d+(\.\d+)?")
 
 
 class Listener:
-    """Safe to look at while messages come. lines: of the log, with their simulated hour."""
+    """Safe to look at while messages come.
+
+    lines: of the log, with their simulated hour. errors_said: node and text of those of level ERROR and above.
+    """
 
     def __init__(self) -> None:
         self.now = self.start = float("nan")
         self.progress = 0.0
         self.lines: List[Tuple[float, str]] = []
+        self.errors_said: List[Tuple[str, str]] = []
         self.counts: Dict[str, int] = dict.fromkeys(COUNTED, 0)
         self.errors: List[Tuple[float, float, float]] = []
         self._stages: Dict[str, Dict[str, str]] = {}
@@ -64,6 +70,12 @@ class Listener:
         """Whether all beams that were sent have been placed."""
         return self.value("sonar_simulator", "beams out") == self.value("sonar_to_cloud", "beams placed")
 
+    def internal_errors(self) -> Dict[str, int]:
+        """Return how many internal errors each stage counts, of those that count any."""
+        with self._lock:
+            told = {name: int(values.get(INTERNAL_ERRORS, 0)) for name, values in self._stages.items()}
+        return {name: count for name, count in told.items() if count}
+
     def complaints(self) -> List[Tuple[str, int]]:
         """Return in which words stages told another level than OK, and how often."""
         with self._lock:
@@ -83,6 +95,8 @@ class Listener:
 
     def _take_line(self, log: Log) -> None:
         self.lines.append((self.hours, f"{log.name}: {_DIGITS.sub('N', log.msg)}"))
+        if log.level >= Log.ERROR:
+            self.errors_said.append((log.name, log.msg))
 
     def _take_diagnostics(self, diagnostics: DiagnosticArray) -> None:
         with self._lock:

@@ -1,8 +1,9 @@
 """What a long run took, and whether that is what a mission can afford."""
 
+import re
 from collections import Counter
 from dataclasses import dataclass
-from typing import Dict, List, NamedTuple, Sequence
+from typing import Dict, Iterator, List, Mapping, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
@@ -17,6 +18,11 @@ _MORE_WAITING = 120  # beams: a scan
 _MOST_LINES = 60  # of one cause in an hour
 _MOST_DISK = 250.0  # MB of logs and saved maps
 _FEWEST = 10  # samples that tell a growth
+_FAILURE = re.compile(  # a traceback, in the log or alone; what roslaunch says of a node that ended
+    r"^(?:.*: )?Traceback \(most recent call last\):\n(?:[ \t].*\n)*.*|^.*process has died.*exit code.*?(?=,)",
+    re.MULTILINE,
+)
+_PLACE = re.compile(r'File "[^"]*", line \d+')
 
 
 @dataclass(frozen=True)
@@ -48,8 +54,8 @@ class JudgedRow(NamedTuple):
     holds: bool
 
 
-def rows(samples: Sequence[Sample], listener: Listener) -> List[JudgedRow]:
-    """Return what the samples of a run and a listener tell."""
+def rows(samples: Sequence[Sample], listener: Listener, printed: str) -> List[JudgedRow]:
+    """Return what the samples of a run, a listener, and what all processes printed tell."""
     settled = [one for one in samples if one.hours >= _SETTLED]
     result = []
     for name in sorted(samples[-1].held):
@@ -66,6 +72,7 @@ def rows(samples: Sequence[Sample], listener: Listener) -> List[JudgedRow]:
             waiting[1] - waiting[0] <= _MORE_WAITING,
         ),
         JudgedRow("logs and maps on disk", f"{disk:.1f} MB", f"<= {_MOST_DISK:.0f} MB", disk <= _MOST_DISK),
+        *of_errors(listener.internal_errors(), listener.errors_said, printed),
         *_of_log(listener),
         *_of_diagnostics(listener),
         *_of_fixes(listener),
@@ -88,6 +95,27 @@ def _of_process(name: str, samples: Sequence[Sample], settled: Sequence[Sample])
         JudgedRow(f"{name}: more files", f"{grown[0]:+d}", f"<= {_MORE_FILES}", grown[0] <= _MORE_FILES),
         JudgedRow(f"{name}: more threads", f"{grown[1]:+d}", f"<= {_MORE_THREADS}", grown[1] <= _MORE_THREADS),
     ]
+
+
+def of_errors(counted: Mapping[str, int], said: Sequence[Tuple[str, str]], printed: str) -> Iterator[JudgedRow]:
+    """Yield what no run may have: internal errors in /diagnostics, errors in the log, and tracebacks printed.
+
+    counted: by stage. said: node and text. printed: what is not in the log, a thread's traceback for instance, too.
+    """
+    for stage, count in counted.items():
+        yield JudgedRow(f"{stage}: internal errors in /diagnostics", f"{count}", "0", False)
+    told: Dict[str, str] = {}
+    for node, text in said:
+        told.setdefault(_in_short(text), node)
+    for one in _FAILURE.findall(printed):
+        told.setdefault(_in_short(one), "printed by a process")
+    for text, node in told.items():
+        yield JudgedRow(f"{node}: error", text, "none", False)
+
+
+def _in_short(text: str) -> str:
+    """Return the place of a traceback and what it says; other text as its last line."""
+    return " ".join([*_PLACE.findall(text)[-1:], text.strip().splitlines()[-1]])
 
 
 def _of_log(listener: Listener) -> List[JudgedRow]:

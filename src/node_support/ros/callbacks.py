@@ -10,6 +10,7 @@ import rospy
 from node_support.errors import RefusedInput
 from node_support.health import Health
 
+INTERNAL_ERRORS = "internal errors"
 _LONGEST_WAIT = 0.1  # s of wall time: the end of the node is noticed within this time
 
 
@@ -36,7 +37,7 @@ def guarded(health: Health, callback: Callable[..., None], topic: str = "") -> C
         except Exception as error:
             if rospy.core.is_shutdown_requested():
                 return
-            health.problem("internal errors", f"{type(error).__name__}: {error}; please report this")
+            health.problem(INTERNAL_ERRORS, f"{type(error).__name__}: {error}; please report this")
             rospy.logerr_throttle(10.0, traceback.format_exc())
 
     return call
