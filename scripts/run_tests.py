@@ -86,6 +86,7 @@ def steps() -> List[Step]:
         *oldest_versions(),
         _pytest("recordings", "test/recordings", load=Load.SPARE),
         _pytest("long tests", "test/unit", "-m", "long", load=Load.SPARE),
+        _damaged_files(),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
         _pytest("documentation", "test/documentation", load=Load.SPARE),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."], load=Load.SPARE),
@@ -101,6 +102,13 @@ def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
     report = RESULTS / f"{name.replace(' ', '_')}.xml"
     command = ["python3", "-m", "pytest", *arguments, f"--junitxml={report}"]
     return Step(name, command, report, load, SPARE_TIMEOUT if load is Load.SPARE else STEP_TIMEOUT)
+
+
+def _damaged_files() -> Step:
+    """Return the step of scripts/fuzz, with few of its damages."""
+    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "10"]
+    variables = {"PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}", "OPENBLAS_NUM_THREADS": "1"}
+    return Step("damaged files", command, load=Load.SPARE, timeout=SPARE_TIMEOUT, variables=variables)
 
 
 def _by_length(test: Path) -> Tuple[bool, str]:
