@@ -36,7 +36,7 @@ class Origin:
     def of_array(cls, stored: np.ndarray) -> "Origin":
         """Return the origin that `array` gave. Raises RefusedInput for any other array."""
         if np.shape(stored) != (12,) or not np.isfinite(stored).all():
-            raise RefusedInput("origins refused", f"a map file holds {stored!r} for its origin")
+            raise RefusedInput("origins refused", f"{stored!r} was stored or sent as one")
         return cls(*(float(number) for number in stored[:3]), np.reshape(stored[3:], (3, 3)))
 
     @property

@@ -243,6 +243,12 @@ NODES: Dict[str, NodeDescription] = {
                 "is no fix while the position is not good",
             ),
             _publishes(
+                topics.MAP_ORIGIN,
+                "std_msgs/Float64MultiArray",
+                "where the map lies on the Earth: latitude and longitude of its origin, azimuth of its x axis [deg], "
+                "covariance (3 x 3) of east, north [m] and yaw [rad]; empty where that is no longer known; latched",
+            ),
+            _publishes(
                 topics.STATUS_MARKERS,
                 "visualization_msgs/MarkerArray",
                 "the status for rviz: in words at the vehicle, green, amber or red, with its ellipse of 95 %",
@@ -340,6 +346,7 @@ NODES: Dict[str, NodeDescription] = {
             _subscribes(topics.POSITION_STATUS, "PositionStatus", "how well the position is known"),
             _subscribes(topics.MAP_CLOUD, "sensor_msgs/PointCloud2", "the map"),
             _subscribes(topics.MARKS, "visualization_msgs/MarkerArray", "the named places of the map"),
+            _subscribes(topics.MAP_ORIGIN, "std_msgs/Float64MultiArray", "where the map lies on the Earth"),
             _subscribes("/diagnostics", "diagnostic_msgs/DiagnosticArray", "what every node tells of itself"),
             _publishes(topics.SET_MARK, "visualization_msgs/Marker", "a place that somebody named or deleted"),
         ),

@@ -50,4 +50,5 @@ MAVROS_POSE = "mavros/vision_pose/pose_cov"  # PoseWithCovarianceStamped: the sa
 MATCHED_SCAN = "MLSM/scan"  # PointCloud2: the newest scan where matching puts it, accepted or not
 MATCHED_PATH = "MLSM/path"  # Path: the vehicle in the map at all matches
 SATELLITE_FIXES = "fix"  # NavSatFix: where a receiver of satellites has the vehicle, at the surface
+MAP_ORIGIN = "MLSM/origin"  # Float64MultiArray: where the map lies on the Earth
 CHART_POSITION = "MLSM/navsat"  # NavSatFix: the vehicle on the Earth now, each second

@@ -16,12 +16,6 @@ class WebPageParameters(BeamMessageParameters):
         28000.0, "most bytes for one page in a second, before they are compressed", low=4000.0, high=1e9
     )
     most_pages: int = parameter(32, "pages that may be open at once", low=1, high=1000)
-    origin: str = parameter(
-        "",
-        "latitude, longitude and azimuth of the map, as '41.2, 3.1, azimuth 90': where its x axis points, clockwise "
-        "from north; empty: not known, y counts as north",
-        may_be_empty=True,
-    )
     map_frame: str = parameter("map", "frame of the map")
     base_frame: str = parameter("base_link", "frame of the vehicle")
     cell: float = parameter(

@@ -8,6 +8,7 @@ from typing import Callable, Dict, Optional, Sequence
 
 import numpy as np
 
+from georeferencing.origin import EAST_DEG
 from node_support.geometry import wrapped
 from node_support.marks import Mark
 from sonar_processing.beams.beam import Beam
@@ -37,12 +38,11 @@ class Scene:
     """Keeps what is newest on a board; a time that jumps back begins a new run. The caller holds the board's lock."""
 
     def __init__(
-        self, parameters: WebPageParameters, azimuth_deg: float, board: Board, beams: str,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:  # fmt: skip
-        """azimuth_deg: of the map's x axis, clockwise from north. beams: name of their topic."""
+        self, parameters: WebPageParameters, board: Board, beams: str, clock: Callable[[], float] = time.monotonic
+    ) -> None:
+        """beams: name of their topic."""
         self.board, self._parameters, self._clock, self._beams = board, parameters, clock, beams
-        self._azimuth_deg = azimuth_deg
+        self._azimuth_deg = EAST_DEG
         self._boot, self._runs = f"{os.getpid()}.{time.time():.0f}", 0
         self._heard: Dict[str, float] = {}
         self._status: Optional[Status] = None
@@ -85,6 +85,11 @@ class Scene:
             self._begin(now)
         self._newest = max(self._newest, now)
         return now - self._start
+
+    def take_azimuth(self, azimuth_deg: float) -> None:
+        """Take where the map's x axis points, clockwise from north."""
+        self._azimuth_deg = azimuth_deg
+        self.hello()
 
     def take_pose(self, now: float, T_map_base: np.ndarray) -> None:
         """Take where the vehicle is (4, 4)."""

@@ -11,6 +11,7 @@ from graph import Diagnostics, Inbox, run
 from messages import place, publisher, transform
 from rosgraph_msgs.msg import Clock
 from sensor_msgs.msg import NavSatFix, NavSatStatus
+from std_msgs.msg import Float64MultiArray
 from tf2_msgs.msg import TFMessage
 
 from georeferencing.origin import Origin
@@ -43,6 +44,7 @@ class Trust(unittest.TestCase):
         cls.clock, cls.tf = publisher("/clock", Clock), publisher("/tf", TFMessage, 2)
         cls.echoes = publisher("/sonar/scan/echoes", StampedIntensityCloud)
         cls.charted = Inbox("/MLSM/navsat", NavSatFix)
+        cls.origins = Inbox("/MLSM/origin", Float64MultiArray)
         cls.satellites = publisher("/fix", NavSatFix)
         cls.seen = publisher("/initialpose", PoseWithCovarianceStamped)
         for inbox in (cls.fixes, cls.now, cls.corrections, cls.status, cls.charted):
@@ -68,6 +70,8 @@ class Trust(unittest.TestCase):
         off = ORIGIN.points([[told.latitude, told.longitude]])[0] - truth(self.seconds)[:2]
         # The receiver did not tell its accuracy: 3 m in each axis, and three degrees of the compass.
         self.assertLess(np.hypot(*off), 1.5)
+        sent = Origin.of_array(np.array(self.origins.wait_for().data))
+        self.assertLess(np.hypot(*ORIGIN.points([[sent.latitude_deg, sent.longitude_deg]])[0]), 1.5)
         self.assertTrue(8.0 < told.position_covariance[0] < 25.0, told.position_covariance)
 
     def test_1_a_jump_of_the_odometry_is_left_out_and_named(self) -> None:

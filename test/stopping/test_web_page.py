@@ -7,10 +7,12 @@ import sys
 import time
 from urllib.request import urlopen
 
+import numpy as np
 import pytest
 from stopwatch import ROOT, START_TIMEOUT, free_port
 from test_master_restart import Master
 
+from georeferencing.origin import Origin
 from mlsm_manager.surface_map.map_file import read_map
 
 webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
@@ -26,6 +28,7 @@ const {data} = map.context.getImageData((x - half) * map.ratio, (y - half) * map
 return data.filter((_, i) => i % 4 === 2).reduce((least, one) => Math.min(least, one), 255);
 }"""
 WALL, WATER = [0.0, 12.0], [8.0, 5.0]
+ORIGIN = Origin(41.2, 3.1, 120.0)
 
 
 class Site:
@@ -39,7 +42,8 @@ class Site:
         self.start_nodes()
 
     def start_nodes(self):
-        self.start("mlsm_core", "nodes/mlsm_core", "_sonar_delay_deviation:=0.0", "_autosave_period:=0.0")
+        parameters = "_sonar_delay_deviation:=0.0", "_autosave_period:=0.0", f"_origin:={ORIGIN}"
+        self.start("mlsm_core", "nodes/mlsm_core", *parameters)
         self.start("feeder", "test/stopping/web_page_feeder.py")
         self.start_page()
 
@@ -118,7 +122,7 @@ def test_1_the_map_the_sonar_and_the_position_are_drawn(site):
     site.run(DARKEST)
     site.wait(f"darkest({WALL}) < 150 && darkest({WATER}) > 220")
     assert site.run("return document.getElementById('depth').textContent") == "2.0 m"
-    assert site.run("return document.getElementById('heading').textContent") == "090°"
+    assert site.run("return document.getElementById('heading').textContent") == "120°"
 
 
 def test_2_the_map_follows_the_vehicle(site):
@@ -149,7 +153,9 @@ def test_4_a_mark_lands_in_the_maps_file_and_in_geojson(site):
     site.wait("document.querySelector('#marks li button')?.textContent === '<b>block</b> ⚓'")
     with urlopen(f"http://127.0.0.1:{site.port}/marks.geojson", timeout=20) as answer:
         (feature,) = json.load(answer)["features"]
-    assert feature["geometry"]["coordinates"] == [3.0, -4.0]
+    assert (feature["properties"]["x"], feature["properties"]["y"]) == (3.0, -4.0)
+    latitude, longitude = ORIGIN.degrees(np.array([[3.0, -4.0]]))[0]
+    assert feature["geometry"]["coordinates"] == pytest.approx([longitude, latitude], abs=1e-7)
     command = ["rosservice", "call", "/mlsm_core/save_map", "{name: marked, overwrite: true}"]
     subprocess.run(command, env=site.environment, check=True, stdout=subprocess.DEVNULL)
     (mark,) = read_map(site.folder / "maps/marked.mlsm").marks

@@ -5,6 +5,7 @@ from typing import Optional
 import numpy as np
 import rospy
 from sensor_msgs.msg import NavSatFix, NavSatStatus
+from std_msgs.msg import Float64MultiArray
 
 from georeferencing.asked import AskedOrigin
 from georeferencing.fixes import fix_of
@@ -39,6 +40,8 @@ class ChartPosition:
         self._base_frame, self._health = base_frame, health
         self._live: Optional[LiveOrigin] = None
         self._own: Optional[Origin] = None
+        self._told: Optional[Origin] = None
+        self._origins = rospy.Publisher(topics.MAP_ORIGIN, Float64MultiArray, queue_size=1, latch=True)
         self._position = rospy.Publisher(topics.CHART_POSITION, NavSatFix, queue_size=2)
         if asked is not None and asked.place is None:
             rospy.Subscriber(topics.SATELLITE_FIXES, NavSatFix, guarded(health, self._take), queue_size=10)
@@ -52,6 +55,9 @@ class ChartPosition:
         if self._localiser.origin is None and asked is not None and asked.place is not None:
             self._localiser.origin = asked.origin(place.time)
         origin = self._localiser.origin
+        if origin is not self._told:
+            self._told = origin
+            self._origins.publish(Float64MultiArray(data=[] if origin is None else origin.array.tolist()))
         if origin is None:
             return
         self._health.show("origin", str(origin))

@@ -1,6 +1,5 @@
 """The ROS side of web_page: beams, fixes, map and diagnostics in; marks out; the rest goes to browsers."""
 
-import time
 from typing import List, Optional
 
 import numpy as np
@@ -8,16 +7,15 @@ import rospy
 from diagnostic_msgs.msg import DiagnosticArray
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from sensor_msgs.msg import PointCloud2
+from std_msgs.msg import Float64MultiArray
 from visualization_msgs.msg import Marker, MarkerArray
 
-from georeferencing.asked import AskedOrigin
-from georeferencing.marks import marks_geojson
+from georeferencing.chart_files import marks_geojson
 from georeferencing.origin import EAST_DEG, Origin
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.files import package_folder
 from node_support.marks import Mark
-from node_support.parameters import ParameterError
 from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import StartError
 from node_support.ros.reconfigurable_parameters import read_parameters
@@ -47,12 +45,11 @@ class WebPage:
         """Raises ParameterError, and StartError where the port cannot be had."""
         self.health = make_health("web_page")
         self.healths = [self.health]
-        parameters = read_parameters(WebPageParameters, "~")
-        self._parameters, self._origin = parameters, _origin(parameters)
+        self._parameters = parameters = read_parameters(WebPageParameters, "~")
+        self._origin: Optional[Origin] = None
         self._marks: List[Mark] = []
         self.board = Board()
-        azimuth_deg = EAST_DEG if self._origin is None else self._origin.azimuth_deg
-        self._scene = Scene(parameters, azimuth_deg, self.board, rospy.resolve_name(topics.BEAMS))
+        self._scene = Scene(parameters, self.board, rospy.resolve_name(topics.BEAMS))
         self._stages = Stages(self.board)
         self._transforms = TfBuffer(self.health)
         self._asked = rospy.Publisher(topics.SET_MARK, Marker, queue_size=_MARKS_QUEUE)
@@ -73,6 +70,7 @@ class WebPage:
             (topics.POSITION_STATUS, PositionStatus, self._take_status, None),
             (topics.MAP_CLOUD, PointCloud2, self._take_map, _MAP_BUFFER),
             (topics.MARKS, MarkerArray, self._take_marks, None),
+            (topics.MAP_ORIGIN, Float64MultiArray, self._take_origin, None),
             ("/diagnostics", DiagnosticArray, self._take_diagnostics, None),
         ):
             size = {} if buffer is None else {"buff_size": buffer}
@@ -145,17 +143,15 @@ class WebPage:
             self._marks = marks
             self._scene.take_marks(marks)
 
+    def _take_origin(self, message: Float64MultiArray) -> None:
+        origin = Origin.of_array(np.array(message.data)) if message.data else None
+        with self.board.lock:
+            self._origin = origin
+            self._scene.take_azimuth(EAST_DEG if origin is None else origin.azimuth_deg)
+
     def _take_diagnostics(self, message: DiagnosticArray) -> None:
         with self.board.lock:
             for one in message.status:
                 # Levels are bytes in Python 3.
                 level = one.level if isinstance(one.level, int) else ord(one.level or b"\0")
                 self._stages.take(one.name, Report(level, one.message, {pair.key: pair.value for pair in one.values}))
-
-
-def _origin(parameters: WebPageParameters) -> Optional[Origin]:
-    try:
-        asked = AskedOrigin.parsed(parameters.origin) if parameters.origin else None
-        return None if asked is None or asked.place is None else asked.origin(time.time())
-    except RefusedInput as refused:
-        raise ParameterError(f"origin = {refused}") from None

@@ -4,7 +4,7 @@ import json
 
 import pytest
 
-from georeferencing.marks import marks_geojson
+from georeferencing.chart_files import marks_geojson
 from georeferencing.origin import Origin
 from node_support.errors import RefusedInput
 from node_support.marks import MOST_MARKS, Mark, Marks

@@ -95,7 +95,7 @@ def test_a_map_file_keeps_an_origin():
     kept = Origin.of_array(origin.array)
     assert kept == origin
     np.testing.assert_array_equal(kept.covariance, origin.covariance)
-    with pytest.raises(RefusedInput, match="map file"):
+    with pytest.raises(RefusedInput, match="stored or sent"):
         Origin.of_array(origin.array[:5])
 
 
@@ -112,7 +112,7 @@ def test_path_and_marks_are_geojson():
     assert line["properties"] == {"name": "a <bag>", "times": [1.0, 2.0]}
     expected = MARINA.degrees(np.array([[BLOCK.x, BLOCK.y]]))[0, ::-1]
     np.testing.assert_allclose(point["geometry"]["coordinates"], expected, atol=1e-8)
-    assert point["properties"] == {"name": "mooring block"}
+    assert point["properties"] == {"name": "mooring block", "x": BLOCK.x, "y": BLOCK.y, "z": BLOCK.z}
 
 
 def test_path_and_marks_are_placemarks():

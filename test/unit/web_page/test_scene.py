@@ -18,7 +18,7 @@ class _Watched:
 
     def __init__(self):
         self.time, self.board, self.page = 0.0, Board(), ThinQueue(1e9)
-        self.scene = Scene(WebPageParameters(), 90.0, self.board, "/sonar/raw", clock=lambda: self.time)
+        self.scene = Scene(WebPageParameters(), self.board, "/sonar/raw", clock=lambda: self.time)
         self.board.open(self.page, 0)
 
     def texts(self):
@@ -68,6 +68,15 @@ def test_depth_and_heading_are_as_people_read_them():
     watched.scene.take_pose(5.0, _pose(yaw=np.pi, z=-3.0))
     x, y, _, depth, heading = watched.now(5.0)["pose"]
     assert (x, y, depth, heading) == (1.0, 2.0, 3.0, 270.0)
+
+
+def test_north_follows_where_the_map_lies():
+    watched = _Watched()
+    watched.scene.take_pose(5.0, _pose(yaw=np.pi / 2.0))
+    watched.scene.take_azimuth(120.0)
+    told = watched.texts()
+    assert told["hello"]["azimuth"] == 120.0
+    assert watched.now(5.0)["pose"][-1] == 30.0
 
 
 def test_a_covariance_that_is_not_known_is_told_as_null():
