@@ -28,7 +28,8 @@ def fuzz(sample: Sample, count: int, seed: int, folder: Path) -> List[str]:
         if number == 0 and outcome.status not in (0, INTERRUPTED):
             complaints.append(f"the sound file is refused: {outcome.lines[-1:]}")
         found += [f"{sample.kind}, seed {seed}, mutation {number}, {command[0]}: {one}" for one in complaints]
-    print(f"{sample.kind}: {ends['read']} read, {ends['refused']} refused, {len(found)} answered badly", flush=True)
+    told = f"{sample.kind}: {ends['read']} read, {ends['refused']} refused, {len(found)} answered badly"
+    print("\n  ".join([told, *found]), flush=True)
     return found
 
 
@@ -64,7 +65,7 @@ def main() -> int:
         for sample in samples(Path(name)):
             if not options.kinds or sample.kind.startswith(tuple(options.kinds)):
                 found += fuzz(sample, options.mutations, options.seed, Path(name))
-    print("\n".join(found) or "nothing was answered badly")
+    print(f"{len(found)} answered badly" if found else "nothing was answered badly")
     return int(bool(found))
 
 

@@ -97,8 +97,8 @@ def _matrices(translations: np.ndarray, rotations: np.ndarray) -> np.ndarray:
 
 def _normalized(quaternions: np.ndarray) -> np.ndarray:
     """Return quaternions (..., 4) of length one; NaN for those that are no rotation or not finite."""
-    norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
-    with np.errstate(invalid="ignore"):
+    with np.errstate(over="ignore", invalid="ignore"):
+        norms = np.linalg.norm(quaternions, axis=-1, keepdims=True)
         valid = (norms > _NORMS[0]) & (norms < _NORMS[1])
         return np.where(valid, quaternions / np.where(valid, norms, 1.0), np.nan)
 

@@ -11,6 +11,7 @@ MAX_BINS = 4096  # Four times what scanning sonars send (Micron 800, Imagenex 85
 
 # m: ten times what scanning sonars hear; farther points would only cost precision.
 FARTHEST_RANGE = 10_000.0
+_MOST_ANGLE = 1e6  # rad: more turns than any head counts; a broken message has up to 1e308
 SERVO_DEAD_BAND = 1e-3  # rad: a servo that holds its place trembles by less, and none steps by as little
 _ROUNDING = 1e-4  # Share: of a length of bins that was computed from float32
 _LONGEST_NS = 10 * 10**9
@@ -49,9 +50,9 @@ class Beam:
         if bins * self.range_resolution > FARTHEST_RANGE:
             reach = f"{bins} bins of {self.range_resolution:g} m reach {bins * self.range_resolution:g} m"
             raise RefusedInput("beams refused", f"{reach}, must be at most {FARTHEST_RANGE:g} m; check the driver")
-        if not (math.isfinite(self.angle) and math.isfinite(self.sensor_angle)):
+        if not all(abs(angle) <= _MOST_ANGLE for angle in (self.angle, self.sensor_angle)):
             angles = f"head at {self.angle} rad, servo at {self.sensor_angle} rad"
-            raise RefusedInput("beams refused", f"{angles}, must be finite; check the driver")
+            raise RefusedInput("beams refused", f"{angles}, must be at most {_MOST_ANGLE:g} rad; check the driver")
         if not self.frame_id:
             raise RefusedInput("beams refused", "frame_id is empty; set the driver's frame")
 

@@ -36,6 +36,8 @@ class Movement(Protocol):
 
 # Peak speed over mean speed of the minimum-jerk law: its greatest slope, reached half way.
 _PEAK = 1.875
+# Beyond all coordinates of worlds: farther away, computing with the world's places overflows.
+_PLACE = {"unit": "m", "low": -1e8, "high": 1e8}
 
 
 class ScriptError(ValueError):
@@ -46,9 +48,9 @@ class ScriptError(ValueError):
 class Start(ParameterSet):
     """The start pose of a script, in the world frame."""
 
-    x: float = parameter(0.0, "start", unit="m")
-    y: float = parameter(0.0, "start", unit="m")
-    z: float = parameter(-2.0, "start, 0 at the water's surface", unit="m")
+    x: float = parameter(0.0, "start", **_PLACE)
+    y: float = parameter(0.0, "start", **_PLACE)
+    z: float = parameter(-2.0, "start, 0 at the water's surface", **_PLACE)
     yaw_deg: float = parameter(0.0, "heading, counter-clockwise from +x", unit="deg")
 
     def pose(self) -> np.ndarray:
@@ -73,9 +75,9 @@ class Entry(ParameterSet):
 class Move(Entry):
     """A displacement along the axes of the world, with a turn, beginning and ending at rest."""
 
-    x: float = parameter(0.0, "displacement", unit="m")
-    y: float = parameter(0.0, "displacement", unit="m")
-    z: float = parameter(0.0, "displacement, up positive", unit="m")
+    x: float = parameter(0.0, "displacement", **_PLACE)
+    y: float = parameter(0.0, "displacement", **_PLACE)
+    z: float = parameter(0.0, "displacement, up positive", **_PLACE)
     yaw_deg: float = parameter(0.0, "turn, counter-clockwise positive", unit="deg")
     speed: float = parameter(1.0, "greatest speed during the move", unit="m/s", low=0.001)
     turn_rate_deg: float = parameter(15.0, "greatest turn rate during the move", unit="deg/s", low=0.001)

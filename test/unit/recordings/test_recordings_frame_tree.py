@@ -1,5 +1,7 @@
 """The pose of any frame in any other: as tf2 finds it, and where tf2 does not look."""
 
+import warnings
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -32,8 +34,10 @@ def random_track(rng, count):
 
 
 def test_poses_that_are_none_are_left_out_and_the_first_of_a_stamp_counts():
-    stamps, places = seconds(2, 1, 1, 3, 4), [[2, 0, 0], [1, 0, 0], [9, 0, 0], [np.nan, 0, 0], [4, 0, 0]]
-    track = PoseTrack.sorted_from(stamps, places, [LEVEL, LEVEL, LEVEL, LEVEL, [0, 0, 0, 0]])
+    stamps, places = seconds(2, 1, 1, 3, 4, 5), [[2, 0, 0], [1, 0, 0], [9, 0, 0], [np.nan, 0, 0], *2 * [[4, 0, 0]]]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        track = PoseTrack.sorted_from(stamps, places, [*4 * [LEVEL], [0, 0, 0, 0], [0, 0, 0, 1e300]])
     assert track.translations[:, 0].tolist() == [1.0, 2.0]
 
 

@@ -1,6 +1,7 @@
 """What beams and clouds refuse to be and hold; where the bins of a beam lie, and how its errors are put right."""
 
 import math
+import re
 
 import numpy as np
 import pytest
@@ -51,10 +52,10 @@ def test_a_beam_reaches_10_km_at_most(resolution):
     assert refused.value.kind == "beams refused"
 
 
-@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf])
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -2e6, 1e300])
 @pytest.mark.parametrize("name", ["angle", "sensor_angle"])
 def test_head_and_servo_point_somewhere(name, value):
-    with pytest.raises(RefusedInput, match=str(value)):
+    with pytest.raises(RefusedInput, match=re.escape(str(value))):
         _beam(**{name: value})
 
 

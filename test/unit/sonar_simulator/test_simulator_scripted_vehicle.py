@@ -85,6 +85,7 @@ def test_a_vehicle_is_still_while_it_waits_and_outside_the_script_only():
         ([{"wait": -1}], r"entry 1: wait = -1: must be a number from 0 s"),
         ([{"wait": 1, "x": 2}], r"entry 1: x = 2: no such parameter; there are wait"),
         ([{"x": math.nan}], r"entry 1: x = nan"),
+        ([{"x": 1e20}], r"entry 1: x = 1e\+20: must be a number from -100000000 to 100000000 m"),
         ([{}], r"entry 1: x, y, z, yaw_deg are all 0"),
         (["wait"], r"entry 1 = 'wait': must be keys and values"),
         ([], r"moves = \[\]: must be a list"),
