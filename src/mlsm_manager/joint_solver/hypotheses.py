@@ -21,15 +21,16 @@ _OTHER = "rival."  # before the names in stored maps
 # Nats: from 20 : 1 on the DVL is believed, which nothing corrects if it is none; the other model errs less, and is
 # believed again below 3 : 1. Beyond 10^5 : 1 against it the DVL is followed no more.
 _CLEAR, _DOUBTED, _EXCLUDED = 3.0, 1.0, -12.0
+_MOST_TIMES = 1000.0  # more is certain
 
 
 class Doubt(NamedTuple):
-    """lead: nats by which the shown odometry is likelier than the `other` one. apart: m between both newest places.
+    """told: which is likelier, in words. other: the odometry that is not shown. apart: m between both newest places.
 
     deviation: m, standard deviation that the other one adds to the newest position. own: m, that without it.
     """
 
-    lead: float
+    told: str
     other: str
     apart: float
     deviation: float
@@ -101,13 +102,15 @@ class Hypotheses:
     @property
     def told(self) -> str:
         """What the echoes tell of the odometry; empty where it was named."""
-        if self.doubt is not None:
-            names = self._name(self.shown), self.doubt.other
-            first, second = names if self.doubt.lead >= 0.0 else names[::-1]
-            return f"{first}, by {abs(self.doubt.lead):.1f} nats over {second}"
-        if self.shown.odometry.mixture is None or np.isnan(self._dvl_lead):
+        if np.isnan(self._dvl_lead):
             return ""
-        return f"{self._name(self.shown)}, by {-self._dvl_lead:.1f} nats over {self._dvl}"
+        other = self._dvl if self.other is None else self._name(self.other)
+        return likelier(self._name(self.shown), self.lead, other)
+
+    @property
+    def lead(self) -> float:
+        """By how many nats the shown odometry is likelier than the other one; NaN where there never was one."""
+        return -self._dvl_lead if self.shown is self._unsure else self._dvl_lead
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan; see LiveSolver.add. fix: in the map of `shown`."""
@@ -119,7 +122,7 @@ class Hypotheses:
                 self.other.solve(of_other)
                 self._weigh()
             except RefusedInput:
-                self.other = self.doubt = None
+                self.other, self.doubt, self._dvl_lead = None, None, np.nan
         return self.shown.estimates[-1]
 
     def _of_other(self, fix: Optional[Fix]) -> Optional[Fix]:
@@ -138,10 +141,9 @@ class Hypotheses:
             self.switched = True
         newest, other = self.shown.estimates[-1], self.other.estimates[-1]
         poses = np.array([[one.T_map_base] for one in (newest, other)])
-        lead = self._lead_of_shown(self._dvl_lead)
-        added = _added(lead, *poses, newest.pose_covariance[np.newaxis], other.pose_covariance[np.newaxis])
+        added = _added(self.lead, *poses, newest.pose_covariance[np.newaxis], other.pose_covariance[np.newaxis])
         self.shown.estimates[-1] = replace(newest, doubt=added[0])
-        self._know(lead, *poses[:, :, :2], added, newest.stated_deviation)
+        self._know(*poses[:, :, :2], added, newest.stated_deviation)
         if self._dvl_lead < _EXCLUDED:
             self.other = self.doubt = None
 
@@ -155,15 +157,14 @@ class Hypotheses:
         fit, other = fits
         unsure = fit if self.shown is self._unsure else other
         self._dvl_lead = self._lead_of_dvl(unsure.told)
-        if self._lead_of_shown(self._dvl_lead) < 0.0:
+        if self.lead < 0.0:
             self.show_other()
             fit, other = other, fit
-        lead, log = self._lead_of_shown(self._dvl_lead), self.shown.log
-        reported = log.node_poses(np.arange(len(fit.node_times)))
+        reported = self.shown.log.node_poses(np.arange(len(fit.node_times)))
         places, others = (reported + one.state.nodes[:, :POSE_COLUMNS] for one in (fit, other))
-        added = _added(lead, places, others, fit.pose_covariances, other.pose_covariances)
+        added = _added(self.lead, places, others, fit.pose_covariances, other.pose_covariances)
         own = float(np.sqrt(np.trace(fit.pose_covariances[-1, :2, :2])))
-        self._know(lead, places, others, added, own)
+        self._know(places, others, added, own)
         return replace(fit, pose_covariances=fit.pose_covariances + added)
 
     def show_other(self) -> None:
@@ -177,9 +178,6 @@ class Hypotheses:
     def _lead_of_dvl(self, told: Gaussian) -> float:
         return self._unsure.odometry.mixture.rival_lead(told)
 
-    def _lead_of_shown(self, dvl_lead: float) -> float:
-        return -dvl_lead if self.shown is self._unsure else dvl_lead
-
     @property
     def _dvl(self) -> str:
         return self._unsure.odometry.mixture.rival.name
@@ -187,11 +185,20 @@ class Hypotheses:
     def _name(self, solver: LiveSolver) -> str:
         return self._dvl if solver is not self._unsure else solver.odometry.mixture.likeliest(solver.told).name
 
-    def _know(self, lead: float, places: np.ndarray, others: np.ndarray, added: np.ndarray, own: float) -> None:
+    def _know(self, places: np.ndarray, others: np.ndarray, added: np.ndarray, own: float) -> None:
         """Keep the doubt where it is the largest."""
         apart = np.hypot(*(others - places)[:, :2].T)
         deviation = np.sqrt(np.maximum(np.trace(added[:, :2, :2], axis1=1, axis2=2), 0.0))
-        self.doubt = Doubt(lead, self._name(self.other), float(apart.max()), float(deviation.max()), own)
+        self.doubt = Doubt(self.told, self._name(self.other), float(apart.max()), float(deviation.max()), own)
+
+
+def likelier(shown: str, lead: float, other: str) -> str:
+    """Return which of two is likelier and how many times, in words; `shown` is so by `lead` nats."""
+    first, second = (shown, other) if lead >= 0.0 else (other, shown)
+    times = float(f"{np.exp(min(abs(lead), np.log(_MOST_TIMES))):.0e}")
+    if times < 2.0:
+        return f"{first}, hardly likelier than {second}"
+    return f"{first}, {'more than ' if times >= _MOST_TIMES else ''}{times:.0f} times likelier than {second}"
 
 
 def _of_rival(solver: LiveSolver) -> Optional[LiveSolver]:

@@ -23,10 +23,11 @@ _MOST_LOOPS = 5  # loops that are printed; summary.json has all
 
 def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: float) -> Dict[str, Any]:
     """Return what summary.json holds. errors: of each trajectory. seconds: how long the run took."""
-    parameters = mapped.parameters
+    parameters, hypotheses = mapped.parameters, mapped.replayed.hypotheses
+    lead = {} if hypotheses is None or np.isnan(hypotheses.lead) else {"lead": round(hypotheses.lead, 1)}
     return {
         **mapped.run.counts,
-        "odometry": {"profile": mapped.odometry.name, "reason": mapped.odometry.reason},
+        "odometry": {"profile": mapped.odometry.name, "reason": mapped.odometry.reason, **lead},
         "beams_without_transform": mapped.recording.unplaced,
         "seconds": round(seconds, 2),
         "times_real_time": round(mapped.recording.seconds / seconds, 1),

@@ -17,9 +17,7 @@ def odometry_decided(doubt: Optional[Doubt]) -> Tuple[Verdict, ...]:
         return ()
     limit = max(doubt.own, _LEAST)
     text = "it is clear" if doubt.deviation <= limit else "it is not clear"
-    text += (
-        f" which odometry the vehicle has ({doubt.lead:.1f} nats over {doubt.other}, {doubt.apart:.1f} m beside it, "
-    )
+    text += f" which odometry the vehicle has ({doubt.told}; with {doubt.other} it is {doubt.apart:.1f} m elsewhere, "
     text += f"which adds {doubt.deviation:.1f} m to the stated deviation, limit {limit:.1f} m)"
     question = "Do the echoes tell whether the distances are a DVL's, where the profile auto leaves that open?"
     return (Verdict("odometry decided", doubt.deviation, limit, text, question=question),)

@@ -8,7 +8,7 @@ from made_harbour import SONAR_IN_BASE, ahead, reporting, tour
 from made_models import followed
 
 from mlsm_manager.joint_solver.batch_solver import solved
-from mlsm_manager.joint_solver.hypotheses import Doubt, Hypotheses
+from mlsm_manager.joint_solver.hypotheses import Doubt, Hypotheses, likelier
 from mlsm_manager.joint_solver.motion_models import SCALE
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
@@ -44,7 +44,7 @@ def run(scale):
 def test_an_odometry_that_is_right_is_taken_for_a_dvl():
     hypotheses, shown = run(0.0)
     named = followed(MADE.scans, PARAMETERS[OdometryKind.DVL])
-    assert hypotheses.told.startswith("DVL, by ")
+    assert hypotheses.told.startswith("DVL, ")
     assert hypotheses.shown.odometry is AUTO.odometry.rival
     for estimate, other in zip(shown[10:], named.estimates[10:]):
         np.testing.assert_allclose(estimate.T_map_base, other.T_map_base, atol=1e-9)
@@ -53,7 +53,7 @@ def test_an_odometry_that_is_right_is_taken_for_a_dvl():
 
 def test_an_odometry_that_is_30_percent_off_is_not():
     hypotheses, shown = run(0.3)
-    assert hypotheses.told.startswith("THRUSTERS, by ")
+    assert hypotheses.told.startswith("THRUSTERS, ")
     assert shown[-1].node[SCALE] == pytest.approx(0.3, abs=0.06)
 
 
@@ -69,7 +69,7 @@ def test_the_stated_deviation_covers_the_error_before_and_after_the_echoes_tell(
 def test_a_model_that_is_out_of_the_question_is_followed_no_more():
     hypotheses, _ = run(0.6)
     assert hypotheses.other is None
-    assert hypotheses.told.endswith("nats over DVL")
+    assert hypotheses.told.endswith(", more than 1000 times likelier than DVL")
     assert odometry_decided(hypotheses.doubt) == ()
 
 
@@ -107,6 +107,19 @@ def test_a_scale_that_does_not_change_is_the_same_all_along_a_fit():
 
 @pytest.mark.parametrize(("deviation", "fires"), [(0.5, False), (2.4, False), (2.6, True)])
 def test_the_check_fires_where_the_other_odometry_is_the_largest_doubt(deviation, fires):
-    (verdict,) = odometry_decided(Doubt(lead=1.0, other="THRUSTERS", apart=4.0, deviation=deviation, own=2.5))
+    (verdict,) = odometry_decided(Doubt("DVL, 3 times likelier than THRUSTERS", "THRUSTERS", 4.0, deviation, own=2.5))
     assert verdict.fires == fires
-    assert "1.0 nats over THRUSTERS" in verdict.text
+    assert "(DVL, 3 times likelier than THRUSTERS; with THRUSTERS it is 4.0 m elsewhere, " in verdict.text
+
+
+@pytest.mark.parametrize(
+    ("lead", "told"),
+    [
+        (4.4, "DVL, 80 times likelier than THRUSTERS"),
+        (-1.1, "THRUSTERS, 3 times likelier than DVL"),
+        (0.1, "DVL, hardly likelier than THRUSTERS"),
+        (12.0, "DVL, more than 1000 times likelier than THRUSTERS"),
+    ],
+)
+def test_how_much_likelier_an_odometry_is_is_told_without_logarithms(lead, told):
+    assert likelier("DVL", lead, "THRUSTERS") == told
