@@ -5,6 +5,7 @@ from pathlib import Path
 import pytest
 from roslaunch.arg_dump import get_args
 from roslaunch.config import load_config_default
+from roslaunch.core import RLException
 
 LAUNCH = Path(__file__).resolve().parents[2] / "launch"
 LAUNCH_FILES = sorted(LAUNCH.glob("*.launch"))
@@ -50,3 +51,11 @@ def test_a_recording_is_played_with_the_shapes_estimator_and_odometry_that_are_a
     found = parameters("play_bag", bag="/none.bag", shapes="false", estimator="THESIS", odometry="heading")
     assert found["/mapping/detectors"] == []
     assert (found["/mlsm_core/estimator"], found["/mlsm_core/odometry"]) == ("THESIS", "HEADING")
+
+
+@pytest.mark.newest_only("roslaunch itself needs a package that is not installed for the oldest Python")
+def test_a_topside_behind_a_thin_link_sends_who_wants_the_page_to_the_vehicle():
+    assert "/web_page/map_frame" in parameters("topside", web="true")
+    assert "/web_page/map_frame" not in parameters("topside", link="thin")
+    with pytest.raises(RLException, match="link:=thin carries no page"):
+        parameters("topside", web="true", link="thin")
