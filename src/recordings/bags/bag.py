@@ -82,6 +82,8 @@ class Bag:
         with _in_one_line(self.path):
             readers = {connection.id: self._deserializer(connection) for connection in connections}
             for connection, time, raw in self._reader.messages(connections):
+                if not isinstance(time, int):  # sqlite holds anything anywhere
+                    raise RecordingError(f"{self.path}: damaged: a message of {topic} was recorded at {time!r}")
                 yield time, readers[connection.id](raw)
 
     def _deserializer(self, connection: Connection) -> Callable[[bytes], Any]:

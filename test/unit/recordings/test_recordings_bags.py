@@ -183,3 +183,13 @@ def test_a_folder_that_is_damaged_is_refused_with_the_file_that_may_open(tmp_pat
     with pytest.raises(RecordingError, match=f"a file of it may open by itself: {database}"):
         Bag(folder)
     assert Bag(database).topics
+
+
+def test_a_message_without_a_time_is_refused_with_its_topic(tmp_path):
+    sqlite3 = pytest.importorskip("sqlite3")
+    folder = write_sqlite_bag(BASIN, tmp_path / "damaged", {"/tf"})
+    (database,) = folder.glob("*.db3")
+    with sqlite3.connect(str(database)) as connection:
+        connection.execute("UPDATE messages SET timestamp = 'noon' WHERE id = 3")
+    with Bag(folder) as bag, pytest.raises(RecordingError, match="a message of /tf was recorded at 'noon'"):
+        list(bag.messages("/tf"))
