@@ -9,7 +9,7 @@ from functools import partial
 from importlib import import_module
 from typing import Callable, Dict, List
 
-from benchmarks import chain_figures, map_bag_figures, map_figures, matching_figures, simulation_figures
+from benchmarks import chain_figures, map_bag_figures, map_figures, matching_figures, shape_figures, simulation_figures
 from benchmarks.harness import Row, print_table
 
 SECTIONS: Dict[str, Callable[[], List[Row]]] = {
@@ -19,6 +19,7 @@ SECTIONS: Dict[str, Callable[[], List[Row]]] = {
     "map-bag": map_bag_figures.rows,
     "matching": matching_figures.rows,
     "chain": chain_figures.rows,
+    "shapes": shape_figures.rows,
     "simulation": simulation_figures.rows,
 }
 STUDIES = (

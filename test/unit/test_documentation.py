@@ -4,6 +4,7 @@ import re
 from pathlib import Path
 
 import pytest
+from benchmarks.__main__ import SECTIONS, STUDIES
 
 pytestmark = pytest.mark.newest_only("about the text of the documents")
 ROOT = Path(__file__).resolve().parents[2]
@@ -13,6 +14,7 @@ PAGES_BY_NAME = {path.relative_to(ROOT).as_posix(): path for path in PAGES}
 CODE_BLOCK = re.compile(r"^(?: {4}[^\n]*|```.*?^```)$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
+TABLE = re.compile(r"(?:^\|.*\n?)+", re.MULTILINE)
 MOST_README_LINES = 170
 
 
@@ -91,6 +93,28 @@ def test_every_message_that_a_page_explains_stands_in_the_code(page):
     code = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
     parts = [part.strip() for message in _explained_messages(PAGES_BY_NAME[page].read_text()) for part in message]
     assert [part for part in parts if part not in code] == []
+
+
+@pytest.mark.parametrize("page", PAGES_BY_NAME)
+def test_every_table_of_figures_names_the_command_that_prints_it(page):
+    head, *sections = re.split(r"^(?=#+ )", PAGES_BY_NAME[page].read_text(), flags=re.MULTILINE)[1:]
+    told = [section for section in (head, *sections) if any(map(_holds_figures, TABLE.findall(section)))]
+    named = re.compile(r"scripts/(?:bench|results)\b")
+    assert [one.partition("\n")[0] for one in told if not named.search(one) and not named.search(head)] == []
+
+
+@pytest.mark.parametrize("page", PAGES_BY_NAME)
+def test_every_benchmark_that_a_page_names_exists(page):
+    named = re.findall(r"scripts/bench (?:--)?([a-z][\w-]*)", PAGES_BY_NAME[page].read_text())
+    assert {name.replace("-", "_") for name in named} - {
+        name.replace("-", "_") for name in (*SECTIONS, *STUDIES)
+    } == set()
+
+
+def _holds_figures(table):
+    """Return whether most cells of a table, without heading and first column, begin with a number."""
+    cells = [cell.strip() for row in table.splitlines()[2:] for cell in row.strip("| ").split("|")[1:]]
+    return 2 * sum(1 for cell in cells if re.match(r"[-+<>]?\d", cell)) > len(cells)
 
 
 def _explained_messages(text):
