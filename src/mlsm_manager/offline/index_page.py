@@ -8,7 +8,7 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
 from mlsm_manager.self_check.headline import FEWEST_MATCHED
-from mlsm_manager.self_check.verdict import Answer
+from mlsm_manager.self_check.verdict import Answer, counted
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
@@ -92,6 +92,7 @@ def _lines(outcome: Outcome) -> List[str]:
     own = outcome.summary
     if not own:
         return [outcome.problem]
-    figures = f"{own['scans']} scans, {own['matched']} matched, {own['blocks']} blocks, {own['seconds']:.0f} s of work"
+    made = f"{counted(own['scans'], 'scan')}, {own['matched']} matched, {counted(own['blocks'], 'block')}"
+    figures = f"{made}, {own['seconds']:.0f} s of work"
     odometry = f"odometry: {own['odometry']['profile']}, because {own['odometry']['reason']}"
     return [own.get("trust", ""), odometry, figures]
