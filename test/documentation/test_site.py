@@ -1,5 +1,6 @@
-"""README.md and the pages of docs/ build to a site."""
+"""README.md and the pages of docs/ build to a site, which a browser shows from files."""
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -8,13 +9,46 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
+BROWSER = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--window-size=390,844")
 
 
-def test_the_pages_build_to_a_site_without_a_warning(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """Build the site and return its folder, and what sphinx printed."""
     for name in ("sphinx", "myst_parser", "furo"):
         pytest.importorskip(name, reason=f"{name} is not installed")
-    options = ["-q", "-W", "--keep-going", "-n", "-b", "html", "-c", "docs", "-d", str(tmp_path / "cache")]
-    command = [sys.executable, "-m", "sphinx", *options, ".", str(tmp_path / "site")]
+    folder = tmp_path_factory.mktemp("site")
+    options = ["-q", "-W", "--keep-going", "-n", "-b", "html", "-c", "docs", "-d", str(folder / "cache")]
+    command = [sys.executable, "-m", "sphinx", *options, ".", str(folder)]
     done = subprocess.run(command, cwd=str(ROOT), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    assert (done.returncode, done.stdout) == (0, "")
-    assert {path.stem for path in (tmp_path / "site" / "docs").glob("*.html")} == {path.stem for path in DOCS}
+    return folder, (done.returncode, done.stdout)
+
+
+@pytest.fixture
+def browser():
+    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+    from selenium.webdriver.chrome.service import Service
+
+    driver = shutil.which("chromedriver")
+    if driver is None or shutil.which("chromium") is None:
+        pytest.skip("chromium and chromedriver are not installed")
+    options = webdriver.ChromeOptions()
+    for option in BROWSER:
+        options.add_argument(option)
+    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+    opened = webdriver.Chrome(service=Service(driver), options=options)
+    yield opened
+    opened.quit()
+
+
+def test_the_pages_build_to_a_site_without_a_warning(site):
+    folder, printed = site
+    assert printed == (0, "")
+    assert {path.stem for path in (folder / "docs").glob("*.html")} == {path.stem for path in DOCS}
+
+
+@pytest.mark.parametrize("page", ["README", "docs/map_bag"])
+def test_a_phone_shows_a_page_from_its_file_whole_and_without_an_error(site, browser, page):
+    browser.get((site[0] / f"{page}.html").as_uri())
+    assert browser.get_log("browser") == []
+    assert browser.execute_script("return document.documentElement.scrollWidth <= window.innerWidth")
