@@ -34,6 +34,8 @@ LAST_MESSAGES_ARRIVE = 3.0
 
 When a connection ends, rospy drops what a listener that stood still for a while has not yet read."""
 _END_STEP = 0.01  # s: roslaunch waits for every node
+_LONGEST_END = 10.0  # s: a map may have to be saved; roslaunch kills a node after 15 s
+_PATIENCE = 5.0  # s: a master that was killed while it was connected may never answer
 
 
 class StartError(Exception):
@@ -103,16 +105,21 @@ def _end(status: int) -> NoReturn:
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
-    # An interrupted call leaves its connection unusable for one more call, which must not be the one that unregisters.
-    with suppress(Exception):
-        rospy.get_master().getPid()
-    threading.Thread(target=rospy.signal_shutdown, args=("the node ends",), daemon=True).start()
-    while not rospy.is_shutdown():
+    threading.Thread(target=_shut_down, daemon=True).start()
+    deadline = time.monotonic() + _LONGEST_END
+    while not rospy.is_shutdown() and time.monotonic() < deadline:
         time.sleep(_END_STEP)
     logging.shutdown()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(status)
+
+
+def _shut_down() -> None:
+    # An interrupted call leaves its connection unusable for one more call, which must not be the one that unregisters.
+    with suppress(Exception):
+        rospy.get_master().getPid()
+    rospy.signal_shutdown("the node ends")
 
 
 def publish_diagnostics(healths: Sequence[Health]) -> None:
@@ -135,6 +142,15 @@ def _filler(health: Health) -> Callable[[DiagnosticStatusWrapper], DiagnosticSta
     return fill
 
 
+class _ImpatientTransport(xmlrpc.client.Transport):
+    """Waits for no answer for ever."""
+
+    def make_connection(self, host: Any) -> Any:
+        connection = super().make_connection(host)
+        connection.timeout = _PATIENCE
+        return connection
+
+
 class MasterWatch:
     """Asks the master every `MASTER_PERIOD` seconds whether it knows this node.
 
@@ -145,7 +161,7 @@ class MasterWatch:
     def __init__(self) -> None:
         """Begin to watch; the node has to be initialised."""
         self.is_lost = False
-        self._master = xmlrpc.client.ServerProxy(rosgraph.get_master_uri())
+        self._master = xmlrpc.client.ServerProxy(rosgraph.get_master_uri(), _ImpatientTransport())
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:

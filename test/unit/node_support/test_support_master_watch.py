@@ -27,3 +27,10 @@ def _answer_all(server, answer):
         with connection:
             connection.recv(4096)
             connection.sendall(answer)
+
+
+def test_a_master_that_never_answers_counts_as_away(monkeypatch):
+    monkeypatch.setattr("node_support.ros.node._PATIENCE", 0.2)
+    with socket.create_server(("localhost", 0)) as server:
+        monkeypatch.setenv("ROS_MASTER_URI", f"http://localhost:{server.getsockname()[1]}")
+        assert not MasterWatch()._does_not_know_us()
