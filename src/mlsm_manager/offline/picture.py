@@ -81,8 +81,10 @@ def _draw_blocks(axes: Axes, blocks: Blocks) -> None:
 
 
 def _draw_scale(axes: Axes, origin: Optional[Origin]) -> None:
-    """Draw a scale bar, and an arrow to the north."""
+    """Draw a scale bar below all else, and an arrow to the north."""
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
+    bottom -= 0.08 * (top - bottom)
+    axes.set_ylim(bottom, top)
     bar = scale_bar(right - left)
     start, height = left + 0.03 * (right - left), bottom + 0.03 * (top - bottom)
     axes.plot([start, start + bar], [height, height], color=_INK, linewidth=4.0, solid_capstyle="butt", zorder=7)
