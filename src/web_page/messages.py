@@ -1,4 +1,4 @@
-"""The bytes that a page gets and the texts that it may send; page/connection.js reads and writes the same.
+"""The bytes that a page gets and the texts that it may send; web/connection.js reads and writes the same.
 
 A binary message begins with 8 bytes: its kind, a number of 8 bits, one of 16 bits, and 4 bytes that depend on the kind.
 All numbers are little-endian; lists of wide numbers come first, so that each begins where its type may begin.
