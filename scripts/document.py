@@ -15,16 +15,16 @@ from from_2015 import from_2015_page
 from parameter_text import default_yaml, markdown_table, start_up_yaml
 
 from autopilot_link.parameters import AutopilotLinkParameters
-from dead_reckoning.parameters import DeadReckoningParameters
+from dead_reckoning.dead_reckoner import DeadReckoningParameters
 from imagenex_852_driver.emulated_852 import EmulatorParameters
-from imagenex_852_driver.line.parameters import DriverParameters
+from imagenex_852_driver.parameters import DriverParameters
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, PROFILES, OdometryKind, Setting, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
 from node_support.parameters import EXPERT, ParameterSet, config_name
 from node_support.thin_queue import ThinLinkParameters
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
-from ping360_driver.line.parameters import DriverParameters as Ping360DriverParameters
+from ping360_driver.parameters import DriverParameters as Ping360DriverParameters
 from sonar_processing.filters.stage_table import STAGES
 from sonar_processing.scans.image import SonarImageParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters

@@ -9,9 +9,8 @@ from benchmarks.harness import ROOT, recorded_beams
 from matplotlib.axes import Axes
 
 from imagenex_852_driver.emulated_852 import Emulated852
-from imagenex_852_driver.line.parameters import HeadSettings
-from imagenex_852_driver.protocol.reply import head_angle
-from imagenex_852_driver.protocol.reply_parser import ReplyParser
+from imagenex_852_driver.parameters import HeadSettings
+from imagenex_852_driver.reply import ReplyParser, head_angle
 from node_support.geometry import pose_matrix
 from sonar_processing.beams.beam import Beam
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model

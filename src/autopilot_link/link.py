@@ -10,7 +10,7 @@ from autopilot_link.parameters import AutopilotLinkParameters
 from autopilot_link.protocol import AutopilotClock, StatedPose
 from node_support.errors import RefusedInput
 from node_support.health import Health
-from sonar_driver.line.port import READ_TIMEOUT, PortUnavailableError, datagram_address, open_port, port_losses
+from sonar_driver.port import READ_TIMEOUT, PortUnavailableError, datagram_address, open_port, port_losses
 
 LINK_LOST = 3.0  # s without a message of the autopilot, whose HEARTBEAT comes each second
 _QUESTION_PERIOD = 1.0  # s between questions of TIMESYNC

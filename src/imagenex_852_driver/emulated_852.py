@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import List, Optional
 
-from imagenex_852_driver.line.parameters import LineTiming
-from imagenex_852_driver.protocol.command import CommandReader, SwitchCommand
-from imagenex_852_driver.protocol.reply import (
+from imagenex_852_driver.command import CommandReader, SwitchCommand
+from imagenex_852_driver.parameters import LineTiming
+from imagenex_852_driver.reply import (
     AHEAD,
     HEAD_IDS,
     HEADER_LENGTH,
@@ -16,8 +16,16 @@ from imagenex_852_driver.protocol.reply import (
     head_angle,
 )
 from node_support.parameters import parameter, with_defaults
-from sonar_driver.emulator.emulated_head import EchoSource, EmulatedHead, FixedPattern, PingRequest, Transmission
-from sonar_driver.emulator.faults import EmulatedHeadParameters, Fault, FaultInjector
+from sonar_driver.emulated_head import (
+    EchoSource,
+    EmulatedHead,
+    EmulatedHeadParameters,
+    Fault,
+    FaultInjector,
+    FixedPattern,
+    PingRequest,
+    Transmission,
+)
 
 _TURN = 2400  # Head positions in a full turn, 0.15 deg each (manufacturer's specification)
 _SONAR_STATUS = 0x01  # Status of a head that is a sonar, not a profiler (manufacturer's specification)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import List, Optional
 
 from node_support.parameters import parameter, with_defaults
-from ping360_driver.protocol.messages import (
+from ping360_driver.messages import (
     CHECKSUM_LENGTH,
     HEADER_LENGTH,
     MessageId,
@@ -13,7 +13,7 @@ from ping360_driver.protocol.messages import (
     packed,
     packed_nack,
 )
-from ping360_driver.protocol.scan_command import (
+from ping360_driver.scan_command import (
     AHEAD,
     PERIOD_TICKS,
     SAMPLES,
@@ -23,8 +23,16 @@ from ping360_driver.protocol.scan_command import (
     head_angle,
     longest_pulse_us,
 )
-from sonar_driver.emulator.emulated_head import EchoSource, EmulatedHead, FixedPattern, PingRequest, Transmission
-from sonar_driver.emulator.faults import EmulatedHeadParameters, Fault, FaultInjector
+from sonar_driver.emulated_head import (
+    EchoSource,
+    EmulatedHead,
+    EmulatedHeadParameters,
+    Fault,
+    FaultInjector,
+    FixedPattern,
+    PingRequest,
+    Transmission,
+)
 
 _HALF_TURN = TURN // 2
 _PING360 = 2

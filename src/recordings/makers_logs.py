@@ -7,15 +7,15 @@ from typing import Callable, Dict, Iterator, List, Optional, Tuple
 import numpy as np
 
 from imagenex_852_driver.log_file import LogReader, timed
-from imagenex_852_driver.protocol.reply import head_angle as imagenex_angle
+from imagenex_852_driver.reply import head_angle as imagenex_angle
 from node_support.errors import RefusedInput
 from node_support.headers import check_stamp
+from ping360_driver.messages import MessageError, MessageId, MessageStream, PingMessage
 from ping360_driver.ping_viewer_log import NoLogError, PingViewerLog
-from ping360_driver.protocol.messages import MessageError, MessageId, MessageStream, PingMessage
-from ping360_driver.protocol.replies import Beam as HeadBeam
-from ping360_driver.protocol.replies import beam as head_beam
-from ping360_driver.protocol.scan_command import bin_length
-from ping360_driver.protocol.scan_command import head_angle as ping360_angle
+from ping360_driver.scan_command import Beam as HeadBeam
+from ping360_driver.scan_command import beam as head_beam
+from ping360_driver.scan_command import bin_length
+from ping360_driver.scan_command import head_angle as ping360_angle
 from recordings.bags.bag import RecordingError
 from recordings.beam_table import beams_of_table, is_beam_table
 from recordings.beams import RecordedBeams

@@ -14,9 +14,9 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 import numpy as np
 
 from node_support.geometry import pose_matrix, quaternion_of
-from ping360_driver.protocol.messages import MessageError, MessageId
-from ping360_driver.protocol.replies import Beam as HeadBeam
-from ping360_driver.protocol.replies import beam as head_beam
+from ping360_driver.messages import MessageError, MessageId
+from ping360_driver.scan_command import Beam as HeadBeam
+from ping360_driver.scan_command import beam as head_beam
 from recordings.bags.bag import RecordingError
 from recordings.motion.pose_track import LATEST_NS, PoseTrack
 

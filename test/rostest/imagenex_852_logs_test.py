@@ -8,9 +8,8 @@ import rospy
 from driver_listener import beams, diagnostics, values
 from graph import ended, recording, run, temporary_folder
 
-from imagenex_852_driver.log_file import LogReader, LogWriter
-from imagenex_852_driver.log_record import LoggedPing
-from imagenex_852_driver.protocol.reply import Reply, ReplyKind
+from imagenex_852_driver.log_file import LoggedPing, LogReader, LogWriter
+from imagenex_852_driver.reply import Reply, ReplyKind
 from imagenex_852_driver.ros.nodes import reply_message
 from underwater_map_construction.msg import SonarScanLine
 

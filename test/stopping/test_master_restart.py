@@ -9,9 +9,8 @@ import xmlrpc.client
 import pytest
 from stopwatch import ROOT, START_TIMEOUT, STOP_TIMEOUT, free_port
 
-from imagenex_852_driver.log_file import LogWriter
-from imagenex_852_driver.log_record import LoggedPing
-from imagenex_852_driver.protocol.reply import Reply, ReplyKind
+from imagenex_852_driver.log_file import LoggedPing, LogWriter
+from imagenex_852_driver.reply import Reply, ReplyKind
 from node_support.ros.node import MASTER_PERIOD
 
 NODES = ("thresholder", "mapping", "imagenex_852_driver", "gazebo_sonar", "play_852")

@@ -1,27 +1,125 @@
-"""The ROS side of autopilot_link: tf, fixes and their status in; positions out."""
+"""The ROS side of autopilot_link: tf, fixes and their status in; positions, and what the autopilot measures, out."""
 
 import threading
-from typing import TYPE_CHECKING, Optional, Tuple, Union
+from typing import TYPE_CHECKING, Any, Optional, Tuple, Union
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseWithCovarianceStamped, Transform
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, Transform, TwistStamped, Vector3
+from nav_msgs.msg import Odometry
+from sensor_msgs.msg import FluidPressure, Imu
+from std_msgs.msg import Header
 
-from autopilot_link.parameters import AutopilotLinkParameters
-from autopilot_link.protocol import Corrections, StatedPose, enu_of_map, full_covariance, velocity_between
-from autopilot_link.ros.instruments import Instruments
-from autopilot_link.ros.mavros_topics import MavrosTopics
+from autopilot_link.parameters import AutopilotLinkParameters, PoseMessage
+from autopilot_link.protocol import (
+    Corrections,
+    StatedPose,
+    enu_of_map,
+    full_covariance,
+    rotation_of_attitude,
+    velocity_between,
+    velocity_of_ned,
+)
 from node_support import topics
+from node_support.errors import RefusedInput
+from node_support.geometry import quaternion_of
+from node_support.headers import check_stamp
 from node_support.health import SILENCE
 from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.transforms import JUMP_BACK, TfBuffer, matrix_from_message
-from sonar_driver.line.port import PortRefusedError
+from node_support.ros.transforms import JUMP_BACK, TfBuffer, matrix_from_message, pose_from_matrix
+from sonar_driver.port import PortRefusedError
 from underwater_map_construction.msg import PositionStatus
+
+
+class MavrosTopics:
+    """Stands where an AutopilotLink would; MAVROS takes no reset counter."""
+
+    name = "MAVROS"
+
+    def __init__(self, parameters: AutopilotLinkParameters) -> None:
+        """Publish one of the topics that MAVROS takes."""
+        self._frames = parameters.map_frame, parameters.base_frame
+        if parameters.message is PoseMessage.ODOMETRY:
+            self._publisher = rospy.Publisher(topics.MAVROS_ODOMETRY, Odometry, queue_size=10)
+        else:
+            self._publisher = rospy.Publisher(topics.MAVROS_POSE, PoseWithCovarianceStamped, queue_size=10)
+
+    def obstacle(self) -> str:
+        """Return why no position can be sent now; empty when one can."""
+        return "" if self._publisher.get_num_connections() else f"nobody listens to {self._publisher.resolved_name}"
+
+    def send(self, pose: StatedPose) -> None:
+        """Publish a position."""
+        message = self._publisher.data_class()
+        message.header.stamp = rospy.Time(*divmod(pose.stamp_ns, 10**9))
+        message.header.frame_id = self._frames[0]
+        message.pose.pose = pose_from_matrix(pose.T_enu_base)
+        message.pose.covariance = pose.covariance.ravel().tolist()
+        if isinstance(message, Odometry):
+            message.child_frame_id = self._frames[1]
+            linear, angular = message.twist.twist.linear, message.twist.twist.angular
+            linear.x, linear.y, linear.z = pose.velocity
+            angular.x = angular.y = angular.z = np.nan
+            message.twist.covariance[0] = np.nan
+        self._publisher.publish(message)
+
 
 if TYPE_CHECKING:
     from autopilot_link.link import AutopilotLink
+
+
+_PASCAL = 100.0  # in a hectopascal
+
+
+class Instruments:
+    """Heading from ATTITUDE, pressure from SCALED_PRESSURE2, velocity from LOCAL_POSITION_NED."""
+
+    def __init__(self, base_frame: str) -> None:
+        self._base_frame = base_frame
+        self._orientation: Optional[np.ndarray] = None
+        self._headings = rospy.Publisher(topics.HEADING, Imu, queue_size=10, tcp_nodelay=True)
+        self._depths = rospy.Publisher(topics.DEPTH, FluidPressure, queue_size=10)
+        self._velocities = rospy.Publisher(topics.MEASURED_VELOCITY, TwistStamped, queue_size=10)
+
+    def take(self, message: Any, offset_ns: Optional[int]) -> None:
+        """Take a message of the autopilot, whose clock is `offset_ns` ahead of ours, None where nobody knows.
+
+        Raises RefusedInput for one that is broken.
+        """
+        takers = {
+            "ATTITUDE": self._take_attitude,
+            "SCALED_PRESSURE2": self._take_pressure,
+            "LOCAL_POSITION_NED": self._take_velocity,
+        }
+        take = takers.get(message.get_type())
+        if take is not None:
+            take(message, self._header(message.time_boot_ms, offset_ns))
+
+    def _header(self, boot_ms: int, offset_ns: Optional[int]) -> Header:
+        stamp_ns = rospy.get_rostime().to_nsec() if offset_ns is None else boot_ms * 10**6 - offset_ns
+        check_stamp(stamp_ns)
+        return Header(stamp=rospy.Time(*divmod(stamp_ns, 10**9)), frame_id=self._base_frame)
+
+    def _take_attitude(self, attitude: Any, header: Header) -> None:
+        self._orientation = rotation_of_attitude(attitude.roll, attitude.pitch, attitude.yaw)
+        imu = Imu(header=header, orientation=Quaternion(*quaternion_of(self._orientation)))
+        # Rates are the vehicle's own, ahead, right, down.
+        imu.angular_velocity = Vector3(attitude.rollspeed, -attitude.pitchspeed, -attitude.yawspeed)
+        imu.linear_acceleration_covariance[0] = -1.0  # not measured (sensor_msgs/Imu)
+        self._headings.publish(imu)
+
+    def _take_pressure(self, pressure: Any, header: Header) -> None:
+        self._depths.publish(FluidPressure(header=header, fluid_pressure=pressure.press_abs * _PASCAL))
+
+    def _take_velocity(self, local: Any, header: Header) -> None:
+        if self._orientation is None:
+            raise RefusedInput("velocities refused", "LOCAL_POSITION_NED came before any ATTITUDE")
+        twist = TwistStamped(header=header)
+        velocity = velocity_of_ned((local.vx, local.vy, local.vz), self._orientation)
+        twist.twist.linear = Vector3(*velocity)
+        self._velocities.publish(twist)
 
 
 class AutopilotLinkNode:

@@ -11,8 +11,17 @@ from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, Imu
 from std_msgs.msg import Float64
 
-from dead_reckoning.dead_reckoner import GAPS, DeadReckoner, Reckoning, depth_of_pressure, rotation_of_heading
-from dead_reckoning.parameters import DeadReckoningParameters, DepthType, HeadingType, VelocitySource
+from dead_reckoning.dead_reckoner import (
+    GAPS,
+    DeadReckoner,
+    DeadReckoningParameters,
+    DepthType,
+    HeadingType,
+    Reckoning,
+    VelocitySource,
+    depth_of_pressure,
+    rotation_of_heading,
+)
 from dead_reckoning.velocity_messages import velocity_type
 from node_support import topics
 from node_support.errors import RefusedInput

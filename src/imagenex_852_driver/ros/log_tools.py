@@ -12,10 +12,9 @@ from dynamic_reconfigure.encoding import decode_config
 from dynamic_reconfigure.msg import Config
 from rosgraph.names import anonymous_name
 
-from imagenex_852_driver.line.parameters import HeadSettings
-from imagenex_852_driver.log_file import LogReader, LogWriter, timed
-from imagenex_852_driver.log_record import LoggedPing
-from imagenex_852_driver.protocol.reply import Reply, ReplyKind, head_position
+from imagenex_852_driver.log_file import LoggedPing, LogReader, LogWriter, timed
+from imagenex_852_driver.parameters import HeadSettings
+from imagenex_852_driver.reply import Reply, ReplyKind, head_position
 from imagenex_852_driver.ros.nodes import reply_message
 from node_support import topics
 from node_support.errors import RefusedInput

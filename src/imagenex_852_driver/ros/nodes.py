@@ -2,16 +2,14 @@
 
 from typing import Optional
 
+from imagenex_852_driver.device import Ping, SonarDevice
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
-from imagenex_852_driver.line.device import Ping, SonarDevice
-from imagenex_852_driver.line.parameters import DriverParameters
-from imagenex_852_driver.protocol.reply import Reply, head_angle
+from imagenex_852_driver.parameters import DriverParameters
+from imagenex_852_driver.reply import Reply, head_angle
 from node_support.ros.node import run
-from sonar_driver.emulator.emulated_head import EchoSource
-from sonar_driver.emulator.faults import FaultInjector
-from sonar_driver.emulator.head_server import PtyLine
-from sonar_driver.ros.driver_node import DriverNode, SonarModel
-from sonar_driver.ros.emulator_node import EmulatorNode, HeadModel, WorldEchoes
+from sonar_driver.emulated_head import EchoSource, FaultInjector
+from sonar_driver.head_server import PtyLine
+from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes
 from underwater_map_construction.msg import SonarScanLine
 
 

@@ -3,16 +3,14 @@
 from typing import Optional
 
 from node_support.ros.node import run
+from ping360_driver.device import Ping, Ping360Device
 from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
-from ping360_driver.line.device import Ping, Ping360Device
-from ping360_driver.line.parameters import DriverParameters
-from ping360_driver.protocol.scan_command import bin_length, head_angle
-from sonar_driver.emulator.emulated_head import EchoSource
-from sonar_driver.emulator.faults import FaultInjector
-from sonar_driver.emulator.head_server import PtyLine, ServedLine, UdpLine
-from sonar_driver.line.port import datagram_address, is_datagram_port
-from sonar_driver.ros.driver_node import DriverNode, SonarModel
-from sonar_driver.ros.emulator_node import EmulatorNode, HeadModel, WorldEchoes
+from ping360_driver.parameters import DriverParameters
+from ping360_driver.scan_command import bin_length, head_angle
+from sonar_driver.emulated_head import EchoSource, FaultInjector
+from sonar_driver.head_server import PtyLine, ServedLine, UdpLine
+from sonar_driver.port import datagram_address, is_datagram_port
+from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes
 from underwater_map_construction.msg import SonarScanLine
 
 

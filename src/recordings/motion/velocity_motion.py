@@ -4,8 +4,7 @@ from typing import Dict, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from dead_reckoning.dead_reckoner import DeadReckoner
-from dead_reckoning.parameters import DeadReckoningParameters, VelocitySource
+from dead_reckoning.dead_reckoner import DeadReckoner, DeadReckoningParameters, VelocitySource
 from dead_reckoning.velocity_messages import VELOCITY_TYPES
 from node_support.errors import RefusedInput
 from recordings.bags.bag import Bag

@@ -17,7 +17,7 @@ from autopilot_link.parameters import AutopilotLinkParameters, PoseMessage
 from autopilot_link.protocol import StatedPose
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
-from sonar_driver.line.port import PortRefusedError
+from sonar_driver.port import PortRefusedError
 
 LOCAL = "udpin:127.0.0.1:0"
 POSE = StatedPose(

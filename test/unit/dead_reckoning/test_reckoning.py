@@ -5,8 +5,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from dead_reckoning.dead_reckoner import DeadReckoner, depth_of_pressure, rotation_of_heading
-from dead_reckoning.parameters import DeadReckoningParameters, HeadingType, VelocitySource
+from dead_reckoning.dead_reckoner import (
+    DeadReckoner,
+    DeadReckoningParameters,
+    HeadingType,
+    VelocitySource,
+    depth_of_pressure,
+    rotation_of_heading,
+)
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix, yaw_of
 

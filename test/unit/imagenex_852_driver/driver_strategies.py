@@ -2,8 +2,8 @@
 
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol.command import SwitchCommand
-from imagenex_852_driver.protocol.reply import HEAD_IDS, RANGES, Reply, ReplyKind
+from imagenex_852_driver.command import SwitchCommand
+from imagenex_852_driver.reply import HEAD_IDS, RANGES, Reply, ReplyKind
 
 commands = st.builds(
     dict,

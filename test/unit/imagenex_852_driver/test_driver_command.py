@@ -5,8 +5,8 @@ from driver_strategies import chunks_of, commands, garbage
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol.command import CommandReader, SwitchCommand
-from imagenex_852_driver.protocol.reply import FrameError, ReplyKind
+from imagenex_852_driver.command import CommandReader, SwitchCommand
+from imagenex_852_driver.reply import FrameError, ReplyKind
 
 
 def test_the_bytes_are_those_of_the_thesis_table():

@@ -4,15 +4,13 @@ import pytest
 from emulated_drivers import EPOCH, IMAGENEX_852, VirtualScan, running, served
 from virtual_line import VirtualStopAt, VirtualTime
 
+from imagenex_852_driver.command import SwitchCommand
+from imagenex_852_driver.device import ReplyWait, SonarDevice
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
-from imagenex_852_driver.line.device import ReplyWait, SonarDevice
-from imagenex_852_driver.line.parameters import ConnectionParameters, Direction, HeadSettings
-from imagenex_852_driver.protocol.command import SwitchCommand
-from imagenex_852_driver.protocol.reply import Reply, ReplyKind
-from imagenex_852_driver.protocol.reply_parser import ParsedReply
-from sonar_driver.emulator.emulated_head import Transmission
-from sonar_driver.emulator.faults import Fault, FaultInjector
-from sonar_driver.line.port import PortUnavailableError
+from imagenex_852_driver.parameters import ConnectionParameters, Direction, HeadSettings
+from imagenex_852_driver.reply import ParsedReply, Reply, ReplyKind
+from sonar_driver.emulated_head import Fault, FaultInjector, Transmission
+from sonar_driver.port import PortUnavailableError
 
 LONG_RANGE = SwitchCommand(max_range=30)
 WAITING = ConnectionParameters(reply_margin=0.25, byte_gap=0.1)

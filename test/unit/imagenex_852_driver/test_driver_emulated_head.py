@@ -2,12 +2,10 @@
 
 import pytest
 
+from imagenex_852_driver.command import SwitchCommand
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters, HeadRotation
-from imagenex_852_driver.protocol.command import SwitchCommand
-from imagenex_852_driver.protocol.reply import ReplyKind
-from imagenex_852_driver.protocol.reply_parser import ReplyParser
-from sonar_driver.emulator.emulated_head import EchoSource
-from sonar_driver.emulator.faults import Fault, FaultInjector
+from imagenex_852_driver.reply import ReplyKind, ReplyParser
+from sonar_driver.emulated_head import EchoSource, Fault, FaultInjector
 
 COMMAND = SwitchCommand(max_range=30, data_points=500)
 

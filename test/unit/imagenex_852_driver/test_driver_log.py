@@ -7,9 +7,16 @@ from driver_strategies import commands, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.log_file import LogReader, LogWriteError, LogWriter, timed
-from imagenex_852_driver.log_record import LoggedPing, check_record_header, decode_record
-from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind
+from imagenex_852_driver.log_file import (
+    LoggedPing,
+    LogReader,
+    LogWriteError,
+    LogWriter,
+    check_record_header,
+    decode_record,
+    timed,
+)
+from imagenex_852_driver.reply import FrameError, Reply, ReplyKind
 
 REPLY = Reply(ReplyKind.IGX, 50, bytes(range(250)) * 2, head_id=0x11)
 

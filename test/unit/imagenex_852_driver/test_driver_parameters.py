@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from imagenex_852_driver.emulated_852 import EmulatorParameters
-from imagenex_852_driver.line.parameters import Direction, DriverParameters, HeadSettings
+from imagenex_852_driver.parameters import Direction, DriverParameters, HeadSettings
 from node_support.parameters import ParameterError
 
 

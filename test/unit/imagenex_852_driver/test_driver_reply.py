@@ -8,8 +8,7 @@ from driver_strategies import chunks_of, garbage, replies
 from hypothesis import given
 from hypothesis import strategies as st
 
-from imagenex_852_driver.protocol.reply import FrameError, Reply, ReplyKind, head_angle, head_position
-from imagenex_852_driver.protocol.reply_parser import ReplyParser
+from imagenex_852_driver.reply import FrameError, Reply, ReplyKind, ReplyParser, head_angle, head_position
 
 RECORDED_HEADER = bytes.fromhex("49475811 45780a32 40037403")
 WHOLE = Reply(ReplyKind.IGX, 50, bytes(range(250)) * 2)

@@ -7,7 +7,7 @@ import pytest
 import yaml
 from document import profile_yaml
 
-from dead_reckoning.parameters import DeadReckoningParameters
+from dead_reckoning.dead_reckoner import DeadReckoningParameters
 from mlsm_manager.localisation.odometry_profiles import PROFILES, OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn

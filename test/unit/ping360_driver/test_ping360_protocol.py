@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from ping360_driver.protocol.messages import (
+from ping360_driver.messages import (
     MessageError,
     MessageId,
     MessageStream,
@@ -16,17 +16,19 @@ from ping360_driver.protocol.messages import (
     packed_nack,
     unpacked,
 )
-from ping360_driver.protocol.replies import beam, device_information, refusal
-from ping360_driver.protocol.scan_command import (
+from ping360_driver.scan_command import (
     PulseSettings,
     ScanCommand,
+    beam,
     bin_length,
+    device_information,
     gradians,
     head_angle,
     information_request,
     longest_pulse_us,
     motor_off,
     pulse_us,
+    refusal,
     sampling,
 )
 

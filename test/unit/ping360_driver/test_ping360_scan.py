@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from emulated_drivers import EPOCH, PATIENCE, PING360, PING360_REQUESTS, VirtualScan, running, served
 
+from ping360_driver.device import Ping360Device
 from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
-from ping360_driver.line.device import Ping360Device
-from ping360_driver.protocol.messages import MessageId, packed
-from ping360_driver.protocol.scan_command import PulseSettings, ScanCommand, bin_length
-from sonar_driver.emulator.faults import Fault, FaultInjector
-from sonar_driver.line.port import PortUnavailableError
+from ping360_driver.messages import MessageId, packed
+from ping360_driver.scan_command import PulseSettings, ScanCommand, bin_length
+from sonar_driver.emulated_head import Fault, FaultInjector
+from sonar_driver.port import PortUnavailableError
 
 MODES = pytest.mark.parametrize(
     "settings", [PING360.settings, PING360_REQUESTS.settings], ids=["auto_transmit", "request"]

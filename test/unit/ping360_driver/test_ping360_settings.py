@@ -2,8 +2,8 @@ import pytest
 
 from node_support.parameters import ParameterError
 from ping360_driver.emulated_ping360 import EmulatorParameters
-from ping360_driver.line.parameters import DriverParameters, HeadSettings
-from ping360_driver.protocol.scan_command import ScanCommand, SectorWalk
+from ping360_driver.parameters import DriverParameters, HeadSettings
+from ping360_driver.scan_command import ScanCommand, SectorWalk
 
 
 @pytest.mark.parametrize(

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from ping360_driver.messages import MessageId, packed
 from ping360_driver.ping_viewer_log import TITLE, NoLogError, PingViewerLog
-from ping360_driver.protocol.messages import MessageId, packed
 from recordings.bags.bag import RecordingError
 from recordings.makers_logs import is_makers_log, makers_beams
 from recordings.motion.vehicle_motion import MotionNames, MotionSource

@@ -6,9 +6,8 @@ import foreign_bag as foreign
 import numpy as np
 import pytest
 
-from imagenex_852_driver.log_file import LogWriter
-from imagenex_852_driver.log_record import LoggedPing
-from imagenex_852_driver.protocol.reply import Reply, ReplyKind
+from imagenex_852_driver.log_file import LoggedPing, LogWriter
+from imagenex_852_driver.reply import Reply, ReplyKind
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
 from recordings.convert_bag import convert_bag

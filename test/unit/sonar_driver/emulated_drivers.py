@@ -11,18 +11,16 @@ from typing import Any, Callable, List, Tuple
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
 from imagenex_852_driver import emulated_852
-from imagenex_852_driver.line import parameters as parameters_852
-from imagenex_852_driver.line.device import SonarDevice
+from imagenex_852_driver import parameters as parameters_852
+from imagenex_852_driver.device import SonarDevice
 from node_support.parameters import ParameterSet
 from ping360_driver import emulated_ping360
-from ping360_driver.line.device import Ping360Device
-from ping360_driver.line.parameters import HeadSettings
-from sonar_driver.emulator.emulated_head import EchoSource
-from sonar_driver.emulator.faults import Fault, FaultInjector, FaultRates
-from sonar_driver.emulator.head_server import HeadServer, PtyLine, UdpLine
-from sonar_driver.line.device import LineDevice, Scanner
-from sonar_driver.line.parameters import LineParameters
-from sonar_driver.line.port import datagram_address, is_datagram_port
+from ping360_driver.device import Ping360Device
+from ping360_driver.parameters import HeadSettings
+from sonar_driver.device import LineDevice, Scanner
+from sonar_driver.emulated_head import EchoSource, Fault, FaultInjector, FaultRates
+from sonar_driver.head_server import HeadServer, PtyLine, UdpLine
+from sonar_driver.port import LineParameters, datagram_address, is_datagram_port
 
 PATIENCE = 60.0
 EPOCH = 1000.0

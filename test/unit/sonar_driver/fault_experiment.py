@@ -11,7 +11,7 @@ from typing import List, Set
 from emulated_drivers import EXACT, SONARS, RecordingInjector, Sonar, VirtualScan
 from virtual_line import VirtualStop, VirtualTime
 
-from sonar_driver.line.driver_health import LineStats
+from sonar_driver.device import LineStats
 
 # s: how long after the longest wait for a reply a late one comes.
 LATENESS = 0.15

@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import pytest
 
-from imagenex_852_driver.line.device import DeviceStats
+from imagenex_852_driver.device import DeviceStats
 from node_support.health import Level
-from sonar_driver.line.driver_health import DriverHealth
+from sonar_driver.device import DriverHealth
 
 
 class Line:

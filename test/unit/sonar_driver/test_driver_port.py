@@ -9,13 +9,13 @@ import pytest
 import serial
 from emulated_drivers import IMAGENEX_852, free_udp_port, served
 
+from imagenex_852_driver.command import SwitchCommand
+from imagenex_852_driver.device import SonarDevice
 from imagenex_852_driver.emulated_852 import Emulated852
-from imagenex_852_driver.line.device import SonarDevice
-from imagenex_852_driver.line.parameters import ConnectionParameters
-from imagenex_852_driver.protocol.command import SwitchCommand
+from imagenex_852_driver.parameters import ConnectionParameters
 from node_support.parameters import ParameterError
-from sonar_driver.emulator.head_server import UdpLine
-from sonar_driver.line.port import PortRefusedError, PortUnavailableError, datagram_address, open_port, port_losses
+from sonar_driver.head_server import UdpLine
+from sonar_driver.port import PortRefusedError, PortUnavailableError, datagram_address, open_port, port_losses
 
 NO_SPEED = 0
 

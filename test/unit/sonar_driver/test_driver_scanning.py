@@ -18,9 +18,9 @@ from emulated_drivers import (
 from fault_experiment import run
 from virtual_line import VirtualStopAt, VirtualTime
 
-from sonar_driver.emulator.faults import Fault, FaultInjector
-from sonar_driver.line.device import Scanner
-from sonar_driver.line.port import PortRefusedError
+from sonar_driver.device import Scanner
+from sonar_driver.emulated_head import Fault, FaultInjector
+from sonar_driver.port import PortRefusedError
 
 BOTH_PORTS = [
     *((sonar, "serial") for sonar in SONARS.values()),

@@ -4,8 +4,8 @@ import threading
 from collections import deque
 from typing import Deque, Optional
 
-from sonar_driver.emulator.emulated_head import EmulatedHead, Transmission
-from sonar_driver.line.port import READ_TIMEOUT, PortUnavailableError, transmission_time
+from sonar_driver.emulated_head import EmulatedHead, Transmission
+from sonar_driver.port import READ_TIMEOUT, PortUnavailableError, transmission_time
 
 
 class VirtualTime:

@@ -2,12 +2,11 @@
 
 from typing import Optional
 
-from ping360_driver.line.message_line import Arrival, MessageLine
-from ping360_driver.line.request_scan import Outcome, beam_time, pinged, turning_time
-from ping360_driver.protocol.messages import MessageError, MessageId
-from ping360_driver.protocol.replies import Beam, beam, refusal
-from ping360_driver.protocol.scan_command import TURN, ScanCommand, information_request, motor_off
-from sonar_driver.line.parameters import LineParameters
+from ping360_driver.message_line import Arrival, MessageLine
+from ping360_driver.messages import MessageError, MessageId
+from ping360_driver.request_scan import Outcome, beam_time, pinged, turning_time
+from ping360_driver.scan_command import TURN, Beam, ScanCommand, beam, information_request, motor_off, refusal
+from sonar_driver.port import LineParameters
 
 _PATIENCE = 2  # Beams that have to be missing before the head counts as silent
 _ANSWER_TIME = 0.3  # s: within this time a head that is alive answers a question

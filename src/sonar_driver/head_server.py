@@ -10,7 +10,7 @@ import tty
 from collections import deque
 from typing import Callable, Deque, Optional, Tuple, Union
 
-from sonar_driver.emulator.emulated_head import EmulatedHead, Transmission
+from sonar_driver.emulated_head import EmulatedHead, Transmission
 
 _PATIENCE = 1.0  # s: a thread that has not changed its state by now has failed
 _WAKE_SIZE = 4096  # Bytes: more than are ever written to wake the server

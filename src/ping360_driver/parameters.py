@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import Tuple
 
 from node_support.parameters import ParameterError, ParameterSet, parameter
-from ping360_driver.protocol.scan_command import (
+from ping360_driver.scan_command import (
     AHEAD,
     PULSE_US,
     SAMPLES,
@@ -17,7 +17,7 @@ from ping360_driver.protocol.scan_command import (
     pulse_us,
     sampling,
 )
-from sonar_driver.line.parameters import LineParameters, MountingParameters
+from sonar_driver.port import LineParameters, MountingParameters
 
 
 @dataclass(frozen=True)

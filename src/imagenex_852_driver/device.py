@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 from typing import Any, Iterator, List, Optional
 
-from imagenex_852_driver.line.parameters import ConnectionParameters
-from imagenex_852_driver.protocol.command import SwitchCommand
-from imagenex_852_driver.protocol.reply import Reply, ReplyKind
-from imagenex_852_driver.protocol.reply_parser import ParsedReply, ReplyParser
-from sonar_driver.line.device import LineDevice
-from sonar_driver.line.driver_health import LineStats
+from imagenex_852_driver.command import SwitchCommand
+from imagenex_852_driver.parameters import ConnectionParameters
+from imagenex_852_driver.reply import ParsedReply, Reply, ReplyKind, ReplyParser
+from sonar_driver.device import LineDevice, LineStats
 
 _SURELY_TOO_EARLY = 0.9  # share of the expected time: too early for any realistic speed of sound
 _QUIET = 0.02  # s: a busy line counts as quiet after that; USB adapters pass bytes on in pieces up to 16 ms apart

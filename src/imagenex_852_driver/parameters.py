@@ -3,12 +3,11 @@
 from dataclasses import dataclass, fields
 from enum import Enum
 
-from imagenex_852_driver.protocol.command import LENGTH as COMMAND_LENGTH
-from imagenex_852_driver.protocol.command import SwitchCommand
-from imagenex_852_driver.protocol.reply import HEAD_IDS, SONAR_HEAD_ID, FrameError
+from imagenex_852_driver.command import LENGTH as COMMAND_LENGTH
+from imagenex_852_driver.command import SwitchCommand
+from imagenex_852_driver.reply import HEAD_IDS, SONAR_HEAD_ID, FrameError
 from node_support.parameters import ParameterError, ParameterSet, parameter
-from sonar_driver.line.parameters import LineParameters, MountingParameters
-from sonar_driver.line.port import transmission_time
+from sonar_driver.port import LineParameters, MountingParameters, transmission_time
 
 MECHANICAL_LIMIT_DEG = 210  # the head's mechanical stops, to either side of straight ahead
 

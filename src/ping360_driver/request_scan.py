@@ -3,12 +3,10 @@
 from dataclasses import dataclass
 from typing import Dict, Optional
 
-from ping360_driver.line.message_line import Arrival, MessageLine
-from ping360_driver.protocol.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageError, MessageId
-from ping360_driver.protocol.replies import Beam, beam, refusal
-from ping360_driver.protocol.scan_command import TURN, PulseSettings, ScanCommand, SectorWalk
-from sonar_driver.line.parameters import LineParameters
-from sonar_driver.line.port import transmission_time
+from ping360_driver.message_line import Arrival, MessageLine
+from ping360_driver.messages import CHECKSUM_LENGTH, HEADER_LENGTH, MessageError, MessageId
+from ping360_driver.scan_command import TURN, Beam, PulseSettings, ScanCommand, SectorWalk, beam, refusal
+from sonar_driver.port import LineParameters, transmission_time
 
 # s: a full turn takes 2.4 s by Ping Viewer's constants, and no command more than 4 s by the ping protocol.
 _SLOWEST_TURN = 4.0

@@ -6,8 +6,8 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Callable, Deque, List, Optional, Tuple
 
-from ping360_driver.protocol.messages import MessageStream, ParsedMessage, PingMessage
-from sonar_driver.line.port import Port, transmission_time
+from ping360_driver.messages import MessageStream, ParsedMessage, PingMessage
+from sonar_driver.port import Port, transmission_time
 
 # After a break the head measures the speed of the line by this letter: as many ones as zeros, in turn (brping).
 _SPEED_SAMPLE = b"U"

@@ -3,23 +3,23 @@
 from dataclasses import dataclass, field
 from typing import Any, Dict, Optional, Union
 
-from ping360_driver.line.auto_scan import AutoScan
-from ping360_driver.line.message_line import MessageLine
-from ping360_driver.line.request_scan import Outcome, RequestScan
-from ping360_driver.protocol.messages import MessageId
-from ping360_driver.protocol.replies import Beam, DeviceInformation, device_information
-from ping360_driver.protocol.scan_command import (
+from ping360_driver.auto_scan import AutoScan
+from ping360_driver.message_line import MessageLine
+from ping360_driver.messages import MessageId
+from ping360_driver.request_scan import Outcome, RequestScan
+from ping360_driver.scan_command import (
     TICK,
+    Beam,
+    DeviceInformation,
     PulseSettings,
     ScanCommand,
     ScanMode,
+    device_information,
     information_request,
     motor_off,
 )
-from sonar_driver.line.device import LineDevice
-from sonar_driver.line.driver_health import LineStats
-from sonar_driver.line.parameters import LineParameters
-from sonar_driver.line.port import Port, PortUnavailableError, is_datagram_port
+from sonar_driver.device import LineDevice, LineStats
+from sonar_driver.port import LineParameters, Port, PortUnavailableError, is_datagram_port
 
 _GREETINGS = 3
 _ANSWER_TIME = 0.3  # s: a head at rest answers within a few milliseconds; one that scans, between two beams

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import List
 
-from imagenex_852_driver.protocol.reply import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError, ReplyKind, require
+from imagenex_852_driver.reply import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError, ReplyKind, require
 
 HEADER = b"\xfe\x44"
 TERMINATOR = 0xFD  # Bytes and codes of the manufacturer's serial interface specification

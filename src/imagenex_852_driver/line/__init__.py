@@ -1,1 +1,0 @@
-"""The serial line: port, device, waiting for replies, and the ping loop."""
