@@ -32,8 +32,7 @@ from sonar_processing.scans.tilt_scan import SonarControlParameters
 from sonar_processing.shapes.circles import CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetectorParameters
 from sonar_simulator import gazebo_beams
-from sonar_simulator.simulation.simulation import SimulatorParameters
-from sonar_simulator.simulation.simulation_setup import GROUPS
+from sonar_simulator.simulation.simulation import GROUPS, SimulatorParameters
 from web_page.parameters import WebPageParameters
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -60,7 +59,7 @@ parameters stay in the namespaces of the stages (`/thresholder/mode`).
 """
 EXECUTABLE = """\
 #!/usr/bin/env python3
-from sonar_processing.ros.stage_runner import run_stage
+from sonar_processing.ros.pipeline import run_stage
 
 run_stage("{name}")
 """

@@ -9,7 +9,7 @@ import numpy as np
 from benchmarks.harness import benchmark_parser
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
 

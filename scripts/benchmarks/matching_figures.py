@@ -15,7 +15,7 @@ from mlsm_manager.scan_matching.scan import Prior, Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import composed, inverse, wrapped
-from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
+from sonar_simulator.simulation.scripted_vehicle import VehicleScript
 
 STARTS = 100
 NEAR, NEAR_YAW = 0.5, np.radians(3.0)

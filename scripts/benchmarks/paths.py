@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.odometry_log import as_complex
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.offline.suited_parameters import with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from sonar_processing.filters.echo_extractor import EchoExtractor

@@ -15,10 +15,10 @@ from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import EchoExtractorParameters, ExtractionMode, extract_echoes
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
+from sonar_simulator.echoes.beam_tracer import BeamPattern
 from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.echoes.thesis_models import LaserCone, LaserConeParameters
-from sonar_simulator.rays.beam_pattern import BeamPattern
-from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_file import load_sdf

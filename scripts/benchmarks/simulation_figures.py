@@ -13,7 +13,7 @@ import rosbag
 from benchmarks.harness import ROOT, Row, median_seconds
 from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
-from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.simulate_bag import main as simulate_bag
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
 from sonar_simulator.world.world_file import load_world

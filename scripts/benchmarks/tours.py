@@ -12,8 +12,8 @@ from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
-from sonar_simulator.simulation.simulation_setup import Settings, make_setup
-from sonar_simulator.vehicle.robot import RobotDescription
+from sonar_simulator.simulation.robot import RobotDescription
+from sonar_simulator.simulation.simulation import Settings, make_setup
 
 HEAD = SonarKind(500, 0.15, 0.3)  # the demo's
 _START = 1000.0  # s

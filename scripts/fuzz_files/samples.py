@@ -12,7 +12,7 @@ from test_driver_log import RECORDS
 from test_ping_viewer_next import write as write_ping_viewer_next
 from test_recordings_ping_viewer import beam_bytes, log_bytes
 
-from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text
+from mlsm_manager.offline.replay import ReplayParameters, live_text
 from node_support.files import package_folder
 from sonar_simulator.simulation.simulate_bag import main as simulate_bag
 

@@ -16,11 +16,11 @@ from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
 from mlsm_manager.offline.map_bag import map_bag_arguments
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
 from mlsm_manager.surface_map.blocks import Blocks
-from sonar_simulator.vehicle.scripted_vehicle import VehicleScript
+from sonar_simulator.simulation.scripted_vehicle import VehicleScript
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.page import joined, prose, table

@@ -14,7 +14,7 @@ from imagenex_852_driver.reply import ReplyParser, head_angle
 from node_support.geometry import pose_matrix
 from sonar_processing.beams.beam import Beam
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
-from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters, WorldEchoes
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world

@@ -19,9 +19,9 @@ from sonar_processing.filters.threshold import Thresholder
 from sonar_processing.scans.assembler import ScanAssembler
 from sonar_processing.scans.tilt_scan import SonarControlParameters, TiltScan
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.echoes.ray_caster import RayCaster
+from sonar_simulator.simulation.robot import Servo, ServoParameters, tilted
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.vehicle.robot import Servo, ServoParameters, tilted
 from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 from thesis_results.page import joined, prose, table

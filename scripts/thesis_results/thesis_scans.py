@@ -7,7 +7,7 @@ from benchmarks.scans import DEPTH, HEAD, Poses, ScanMaker, SonarKind
 
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.offline.recording import Recording
-from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
+from mlsm_manager.offline.replay import ReplayParameters, replay_values
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import pose_matrix

@@ -10,8 +10,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.files import write_whole
 from node_support.help import CommandLine, ending_in_one_line
 from node_support.names_2015 import KEYS, Key
-from node_support.parameter_files import read_values
-from node_support.parameters import EXPERT, ParameterError, ParameterSet
+from node_support.parameters import EXPERT, ParameterError, ParameterSet, read_values
 from sonar_processing.filters.outliers import OutlierRemoverParameters
 from sonar_processing.filters.threshold import ThresholderParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters

@@ -6,7 +6,8 @@ A stage declares its parameters once::
     class RadiusParameters(ParameterSet):
         radius: float = parameter(1.0, "neighbourhood of a point", unit="m", low=0.0, high=100.0)
 
-From that declaration come the start-up check, the refusal at run time and the dynamic_reconfigure description.
+From that declaration come the start-up check, the refusal at run time and the dynamic_reconfigure description. Values
+come from the parameter server, from yaml files and from KEY=VALUE on a command line.
 
 A parameter that hardly anybody needs to change gives the reason for its default as `expert`. Yaml files and the
 parameter server hold such parameters in a mapping of their own, under the key `expert`.
@@ -16,7 +17,10 @@ import dataclasses
 import math
 from difflib import get_close_matches
 from enum import Enum
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar
+from pathlib import Path
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar
+
+import yaml
 
 from node_support.old_keys import GONE, OLD_VALUES, RENAMED
 
@@ -240,3 +244,35 @@ def _in_range(value: Any, description: Description) -> bool:
 
 def _plain(value: Any) -> Any:
     return value.value if isinstance(value, Enum) else value
+
+
+def read_values(path: Path) -> Dict[str, Any]:
+    """Return the values of a yaml file by their keys. Raises ParameterError, which names the file."""
+    try:
+        values = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise ParameterError(f"{path}: {error.strerror}") from error
+    except (ValueError, RecursionError, yaml.YAMLError) as error:
+        # The library raises ValueError for dates that do not exist, RecursionError for what is nested too deeply.
+        raise ParameterError(f"{path}: not yaml: {' '.join(str(error).split())}") from error
+    if not isinstance(values, Mapping) or not all(isinstance(key, str) for key in values):
+        raise ParameterError(f"{path}: must hold lines of KEY: VALUE")
+    return dict(values)
+
+
+def assigned_values(texts: Iterable[str]) -> Dict[str, Any]:
+    """Return the values of texts KEY=VALUE, which are yaml, by their keys; the last one of a key counts.
+
+    Raises ParameterError for a text without key, without = or whose value is no yaml.
+    """
+    return dict(_assigned(text) for text in texts)
+
+
+def _assigned(text: str) -> Tuple[str, Any]:
+    key, equals, value = text.partition("=")
+    if not (key and equals):
+        raise ParameterError(f"--set {text}: must be KEY=VALUE")
+    try:
+        return key, yaml.safe_load(value)
+    except yaml.YAMLError as error:
+        raise ParameterError(f"--set {text}: {value!r} is no yaml value") from error

@@ -10,8 +10,8 @@ from node_support.errors import RefusedInput
 from recordings.bags.bag import Bag, RecordingError, missing_topic
 from recordings.bags.topic_roles import Role, with_role
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.reader import BeamMessageParameters, BeamReader, beam_type
-from sonar_processing.scans.moving_state import MovingState
+from sonar_processing.beams.reader import BeamMessageParameters, BeamReader, beam_type
+from sonar_processing.scans.assembler import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 _VELOCITY_TOPIC = "/cmd_vel"

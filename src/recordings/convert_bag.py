@@ -10,12 +10,10 @@ import numpy as np
 from node_support import topics
 from node_support.files import check_output, whole_file
 from node_support.help import CommandLine, ending_in_one_line
-from node_support.parameter_files import assigned_values
-from node_support.parameters import ParameterError
+from node_support.parameters import ParameterError, assigned_values
 from recordings.bags.bag import RecordingError
-from recordings.bags.bag_writer import BagWriter
-from recordings.bags.mcap_writer import McapWriter
 from recordings.bags.messages import Placing
+from recordings.bags.writers import BagWriter, McapWriter
 from recordings.motion.frame_tree import Link
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import MotionSource

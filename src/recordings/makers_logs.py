@@ -22,7 +22,7 @@ from recordings.beams import RecordedBeams
 from recordings.motion.pose_track import PoseTrack
 from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_headings
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.beam_fields import USUAL_SPEED_OF_SOUND
+from sonar_processing.beams.beam_fields import USUAL_SPEED_OF_SOUND
 
 _FRAME = "sonar"
 _BEAMS = (MessageId.DEVICE_DATA, MessageId.AUTO_DEVICE_DATA)

@@ -27,7 +27,7 @@ from recordings.motion.vehicle_motion import (
     unsaid_motion,
 )
 from sonar_processing.beams.parameters import MountingParameters
-from sonar_processing.messages.reader import BeamMessageParameters
+from sonar_processing.beams.reader import BeamMessageParameters
 
 _Result = TypeVar("_Result")
 

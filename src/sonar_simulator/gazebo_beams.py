@@ -10,7 +10,7 @@ import numpy as np
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, EchoModel, EchoModelName
-from sonar_simulator.rays.ray_grid import Rays, contacts_of_grid
+from sonar_simulator.echoes.ray_grid import Rays, contacts_of_grid
 from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from node_support.parameters import parameter
-from sonar_processing.messages.reader import BeamMessageParameters
+from sonar_processing.beams.reader import BeamMessageParameters
 
 
 @dataclass(frozen=True)

@@ -10,7 +10,7 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import read_recording, scans_of
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import ReplayParameters
 from recordings.reader import Request
 from sonar_processing.filters.echo_extractor import EchoExtractor
 

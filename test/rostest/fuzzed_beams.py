@@ -12,10 +12,10 @@ from foreign_messages import DEFINITIONS, message_classes, sane_message, seriali
 from random_messages import RandomMessages
 
 from node_support.errors import RefusedInput
-from node_support.ros.any_messages import MessageClasses
+from node_support.ros.callbacks import MessageClasses
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.head import HeadWatch
-from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
+from sonar_processing.beams.reader import BeamMessageParameters, BeamReader
 from sonar_processing.scans.assembler import RevolutionCollector, ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan, planar_laser_scan

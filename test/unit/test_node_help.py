@@ -11,7 +11,7 @@ from programs import ROOT, run_program
 
 from node_support.help import WIDTH
 from node_support.node_table import HOSTS, NODES
-from sonar_simulator.simulation.simulation_setup import GROUPS
+from sonar_simulator.simulation.simulation import GROUPS
 
 EXECUTABLES = sorted(path.name for path in (ROOT / "nodes").iterdir())
 PARAMETERS = {**LIVE_NODES, **START_UP_NODES}

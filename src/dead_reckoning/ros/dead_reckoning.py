@@ -26,8 +26,7 @@ from dead_reckoning.velocity_messages import velocity_type
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame
-from node_support.ros.any_messages import MessageClasses
-from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.callbacks import MessageClasses, guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import TfBuffer, matrix_of_quaternion, pose_from_matrix
 

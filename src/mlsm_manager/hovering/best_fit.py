@@ -5,8 +5,8 @@ from typing import List
 
 import numpy as np
 
-from mlsm_manager.hovering.echoes import echoes_of_run
 from mlsm_manager.hovering.particle_filter import ParticleFilter, on_path
+from mlsm_manager.hovering.particles import echoes_of_run
 from mlsm_manager.hovering.path_agreement import log_likelihood
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
 from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_path, solved

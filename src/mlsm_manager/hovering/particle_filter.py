@@ -12,8 +12,18 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.hovering.compiled_particles import Echoes, Pull, log_likelihoods, moves_onto_echoes
-from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FACING, FARTHEST, echoes_of
-from mlsm_manager.hovering.particles import Particles, drawn, led, squares_of
+from mlsm_manager.hovering.particles import (
+    ACROSS,
+    ALONG,
+    AROUND,
+    FACING,
+    FARTHEST,
+    Particles,
+    drawn,
+    echoes_of,
+    led,
+    squares_of,
+)
 from mlsm_manager.joint_solver.normal_equations import YAW
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.parameters import SolverParameters

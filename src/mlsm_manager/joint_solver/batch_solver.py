@@ -8,7 +8,6 @@ import numpy as np
 from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
-from mlsm_manager.joint_solver.heading_errors import by_heading
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, add_loops, loops_of
 from mlsm_manager.joint_solver.map_support import misfit_variances
@@ -26,6 +25,7 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian
 from mlsm_manager.joint_solver.solution import Solution, Submaps
+from mlsm_manager.joint_solver.velocity_models import by_heading
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter

@@ -7,9 +7,8 @@ import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations, misfit_covariance
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.live_loops import Bend, ClosedLoop, confirmed, with_newest
 from mlsm_manager.joint_solver.live_window import LiveWindow, superfluous
-from mlsm_manager.joint_solver.loops import Loop
+from mlsm_manager.joint_solver.loops import Bend, ClosedLoop, Loop, confirmed, with_newest
 from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, YAW, State
@@ -17,9 +16,8 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
-from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.run_log import RunLog, stacked, unstacked
 from mlsm_manager.joint_solver.solution import Fix, Fixes, Solution, Submaps
-from mlsm_manager.joint_solver.stored_arrays import stacked, unstacked
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 

@@ -8,8 +8,7 @@ import numpy as np
 from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.live_loops import Bend
-from mlsm_manager.joint_solver.loops import add_loops
+from mlsm_manager.joint_solver.loops import Bend, add_loops
 from mlsm_manager.joint_solver.map_support import Met, agreement
 from mlsm_manager.joint_solver.motion_models import frozen_deviations
 from mlsm_manager.joint_solver.normal_equations import (

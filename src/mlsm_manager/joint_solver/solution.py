@@ -6,13 +6,12 @@ from typing import Dict, List, Mapping, Optional, Protocol, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
-from mlsm_manager.joint_solver.compiled_placement import Heard, path_rows, placed_rows
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, Layout, NormalEquations, State
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import NO_POINTS, PlacedPoints
+from mlsm_manager.joint_solver.placement import NO_POINTS, Heard, PlacedPoints, path_rows, placed_rows
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 from mlsm_manager.joint_solver.run_log import PointTable, RunLog
 from node_support.geometry import inverse, transformed

@@ -1,7 +1,7 @@
 """Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
 
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import Callable, Optional
 
 import numpy as np
 
@@ -20,6 +20,7 @@ from mlsm_manager.joint_solver.motion_models import (
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
 from mlsm_manager.scan_matching.prediction import Fading
+from node_support.geometry import harmonics
 
 AHEAD, ASIDE, TRAVEL, TURN_RATE = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw
 _ROUNDING_VARIANCE = 1e-4  # m^2: of a step, so that steps of no duration do not divide by zero
@@ -259,3 +260,30 @@ def _bridged(deviation: float, time: float, durations: np.ndarray) -> np.ndarray
     The integral less the mean of both ends times the duration; for short durations that is a random walk's bridge.
     """
     return deviation**2 * np.minimum(durations**3 / (6.0 * time), 2.0 * time * durations)
+
+
+# Of the cosine and sine of the heading (iron that is magnetic itself) and of twice the heading (soft iron): times the
+# heading's deviation at any time, usually one degree. That is left where a compass was calibrated on its vehicle.
+_TIMES = np.array([2.0, 2.0, 1.0, 1.0])
+
+
+def by_heading(
+    compass: Compass, layout: Layout, yaws: np.ndarray, durations: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]
+) -> np.ndarray:
+    """Return columns (size, 4) whose outer product is what the error adds to the covariance of all unknowns.
+
+    yaws: (n,) rad, reported at the nodes of `layout`, with (n - 1,) s between them. solve: the information's inverse
+    times columns. The error is an unknown of its own that is eliminated; the solution stays where it is.
+    """
+    errors, change = harmonics(yaws) * _TIMES * compass.heading_deviation, compass.change(durations)
+    steps = errors[1:] - change.kept[:, np.newaxis] * errors[:-1]
+    weighted = steps / change.variance[:, np.newaxis]
+    first = errors[0] / compass.heading_deviation**2
+    nodes = layout.node_start(np.arange(layout.first, layout.last + 1)) + YAW
+    shared = np.zeros((layout.size, len(_TIMES)))
+    shared[nodes[1:]] += weighted
+    shared[nodes[:-1]] -= change.kept[:, np.newaxis] * weighted
+    shared[nodes[0]] += first
+    moved = solve(shared)
+    left = np.eye(len(_TIMES)) + steps.T @ weighted + np.outer(errors[0], first) - shared.T @ moved
+    return np.linalg.solve(np.linalg.cholesky(left), moved.T).T

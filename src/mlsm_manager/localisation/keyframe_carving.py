@@ -9,10 +9,9 @@ import numpy as np
 
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
-from mlsm_manager.surface_map.cell_index import cell_keys, cells_of_keys
+from mlsm_manager.surface_map.cells import cell_keys, cells_of_keys
 from mlsm_manager.surface_map.free_space import BeamFindings, Carver, CarveReport, FirstEchoes, pairs_of_groups
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.overlay import Overlay
+from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap, Overlay
 
 _STRAYED = 0.5
 """Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""

@@ -16,8 +16,7 @@ from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.free_space import Carver, CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport, blocks_of
 from mlsm_manager.surface_map.map_file import Layer
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.overlay import Covered, Overlay
+from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap, Overlay
 
 
 @dataclass(frozen=True)

@@ -9,15 +9,14 @@ from typing import Dict, Mapping, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.stored_arrays import stacked, unstacked
+from mlsm_manager.joint_solver.run_log import stacked, unstacked
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, STATES
 from mlsm_manager.surface_map.blocks import ROW_WIDTH
-from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from mlsm_manager.surface_map.overlay import Covered
+from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, inverse
 

@@ -12,19 +12,18 @@ from tqdm import tqdm
 
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
+from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.offline.causes import with_odometry_mended
 from mlsm_manager.offline.findings import Findings, Trust
 from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, refine, refitted_verdicts
-from mlsm_manager.offline.replay import Replayed, replay
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_cells, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
-from mlsm_manager.self_check.causes import Cause, ranked
+from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, ranked
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings
 from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -220,3 +219,16 @@ def _run(
     paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
     further = [path for path in paths if len(path.times)]
     return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, trust, further)
+
+
+def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:
+    """Return a recording whose odometry goes where a vehicle can have gone, and what was wrong with it."""
+    track, steps, held = mended(recording.track, limits)
+    causes = of_steps(steps)
+    causes += [
+        Cause(f"odometry held for {end - begin:.0f} s, and then right again,", CERTAIN, begin, True)
+        for begin, end in held
+    ]
+    if not causes:
+        return recording, []
+    return recording.with_track(track), causes

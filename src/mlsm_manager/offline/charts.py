@@ -1,17 +1,18 @@
-"""A run on the Earth: where its map lies, as the user or satellites tell, and the files of charts."""
+"""A run on the Earth: where its map lies, as the user or satellites tell; fixes of satellites, and files of charts."""
 
 import sys
 from argparse import Namespace
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Dict, Sequence
+from typing import Any, Dict, List, Sequence
 
 import numpy as np
 
 from georeferencing.adjustment import Adjusted, adjusted
 from georeferencing.asked import AskedOrigin
 from georeferencing.chart_files import ChartedPath, geojson, kml
-from georeferencing.fixes import Fix, PlacedFixes
+from georeferencing.fixes import Fix, PlacedFixes, fix_of
 from georeferencing.origin import STORED
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.run_files import Run, positions_at
@@ -19,8 +20,34 @@ from mlsm_manager.surface_map.export.charts import write_geotiff, write_tiles
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support.errors import RefusedInput
 from node_support.files import write_whole
-from recordings.bags.bag import RecordingError
-from recordings.satellite_fixes import satellite_fixes
+from node_support.topics import CHART_POSITION
+from recordings.bags.bag import Bag, RecordingError
+from recordings.makers_logs import is_makers_log
+from recordings.motion.autopilot_log import fixes_of_autopilot, is_autopilot_log
+from recordings.motion.motion_table import is_table
+
+_TYPE = "sensor_msgs/NavSatFix"
+
+
+def satellite_fixes(path: Path) -> List[Fix]:
+    """Return the fixes in a bag or in an autopilot's log, those of the topic with most; none in any other file.
+
+    Messages of receivers without a fix are left out. Raises RecordingError.
+    """
+    if is_autopilot_log(path):
+        return fixes_of_autopilot(path)
+    if is_table(path) or is_makers_log(path):
+        return []
+    fixes: List[Fix] = []
+    with Bag(path) as bag:
+        # What mlsm_core published is no measurement.
+        topics = [one for one in bag.topics.values() if one.type == _TYPE and not one.name.endswith(CHART_POSITION)]
+        for topic in sorted(topics, key=lambda one: -one.count)[:1]:
+            for _, message in bag.messages(topic.name):
+                with suppress(RefusedInput):
+                    fixes.append(fix_of(message))
+    return sorted(fixes)
+
 
 CHART_FILES = ("path.geojson", "path.kml", "map.tif", "tiles")
 

@@ -13,8 +13,7 @@ from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import RUN_COLUMNS
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.offline.refinement import Refined
-from mlsm_manager.offline.replay import Replayed
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Cause, widened

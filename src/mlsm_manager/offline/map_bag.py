@@ -15,7 +15,7 @@ from mlsm_manager.offline.charts import with_origin, write_charts
 from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.mcap_file import write_mcap
 from mlsm_manager.offline.recording import read_recording
-from mlsm_manager.offline.replay_parameters import ReplayParameters, live_text, replay_values
+from mlsm_manager.offline.replay import ReplayParameters, live_text, replay_values
 from mlsm_manager.offline.run_files import MCAP, PICTURE, REPORT, errors_of, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.run_reports import mission_of, summary_lines, summary_of
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
@@ -23,10 +23,9 @@ from mlsm_manager.report.mission import Mission
 from node_support.errors import RefusedInput
 from node_support.files import make_folder, write_whole
 from node_support.help import CommandLine, ending_in_one_line
-from node_support.parameter_files import assigned_values, read_values
-from node_support.parameters import OLD_KEYS, ParameterError
+from node_support.parameters import OLD_KEYS, ParameterError, assigned_values, read_values
 from recordings.bags.bag import RecordingError
-from recordings.bags.mcap_writer import mcap_writer
+from recordings.bags.writers import mcap_writer
 from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import ReadingParameters, add_reading_arguments, request_of
 from recordings.survey import report, survey

@@ -9,8 +9,8 @@ from mlsm_manager.report.mission import Mission, Path
 from mlsm_manager.self_check.verdict import Answer
 from mlsm_manager.surface_map.export.rasters import occupancy
 from node_support.files import whole_file
-from recordings.bags.mcap_writer import McapWriter
 from recordings.bags.messages import Placing, write_pose
+from recordings.bags.writers import McapWriter
 
 _MAP, _VEHICLE = "map", "base_link"
 _FLOAT32 = 7  # of PointField

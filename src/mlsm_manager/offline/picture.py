@@ -17,7 +17,7 @@ from mlsm_manager.report.compass_rose import north, north_label, scale_bar
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.export.ridges import counts, ridges
+from mlsm_manager.surface_map.export.rasters import counts, ridges
 from node_support.files import write_whole
 
 _WALL, _POINTS, _INK, _GRATICULE = "#8c2318", "#fcc3ab", "#333333", "#5b7fa6"

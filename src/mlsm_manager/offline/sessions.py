@@ -9,8 +9,7 @@ from typing import Callable, Dict, List, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
-from mlsm_manager.offline.replay import CORRECTED, Replayed
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import CORRECTED, Replayed, ReplayParameters
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
 from sonar_processing.beams.parameters import BeamCorrection

@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.offline.recording import Recording
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.map_checks import scans_go_on
 from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts

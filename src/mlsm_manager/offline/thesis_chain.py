@@ -6,7 +6,7 @@ from typing import Any, Dict, Iterator, Mapping, Tuple
 from mlsm_manager.offline.recording import Recording, clouds_with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.files import package_folder
-from node_support.parameter_files import read_values
+from node_support.parameters import read_values
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.outliers import OutlierRemover, OutlierRemoverParameters
 from sonar_processing.filters.threshold import Thresholder, ThresholderParameters

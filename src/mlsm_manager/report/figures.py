@@ -10,7 +10,7 @@ from PIL import Image
 
 from mlsm_manager.report.compass_rose import north, north_label, scale_bar
 from mlsm_manager.report.mission import Mission, Path, Uncertainty
-from mlsm_manager.surface_map.export.ridges import counts, ridges
+from mlsm_manager.surface_map.export.rasters import counts, ridges
 
 SCAN_TRACE = "scan at the chosen time"
 VEHICLE_TRACE = "vehicle at the chosen time"

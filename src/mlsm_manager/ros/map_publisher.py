@@ -16,7 +16,7 @@ from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
-from mlsm_manager.surface_map.export.octomap import octree
+from mlsm_manager.surface_map.export.formats import octree
 from mlsm_manager.surface_map.export.rasters import Raster, occupancy
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support import topics

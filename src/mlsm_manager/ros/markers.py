@@ -10,8 +10,8 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.surface_map.blocks import Blocks
+from mlsm_manager.surface_map.cells import THINNEST, BoxLists, box_lists, box_size, box_type
 from mlsm_manager.surface_map.export.pictures import TYPE_COLORS, ColorBy, Limits, block_colors, color_limits
-from mlsm_manager.surface_map.tiles import THINNEST, BoxLists, box_lists, box_size, box_type
 
 Tile = Tuple[int, int]
 COLORS = {kind: ColorRGBA(*color, 1.0) for kind, color in TYPE_COLORS.items()}

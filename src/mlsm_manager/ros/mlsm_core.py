@@ -22,9 +22,8 @@ from mlsm_manager.localisation.updates import (
 )
 from mlsm_manager.ros.chart_position import ChartPosition
 from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform, planar_pose
-from mlsm_manager.ros.map_marks import MapMarks
 from mlsm_manager.ros.map_publisher import MapPublisher
-from mlsm_manager.ros.map_services import Autosave, MapServices
+from mlsm_manager.ros.map_services import Autosave, MapMarks, MapServices
 from mlsm_manager.ros.odometry_track import OdometryTrack, planar
 from mlsm_manager.ros.status_teller import StatusTeller
 from mlsm_manager.scan_matching.scan import Scan

@@ -10,8 +10,7 @@ from std_msgs.msg import Float64
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.node_table import SERVO_2015
-from node_support.ros.any_messages import MessageClasses
-from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.callbacks import MessageClasses, guarded, make_health
 from underwater_map_construction.msg import ModelCoefficients, Wall, Walls
 from underwater_map_construction.srv import SetScanMode, SetScanModeRequest, SetScanModeResponse
 

@@ -8,7 +8,7 @@ from weakref import WeakSet
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks
-from mlsm_manager.surface_map.cell_index import NO_BLOCK, CellIndex
+from mlsm_manager.surface_map.cells import NO_BLOCK, CellIndex
 from node_support.numba_cache import compiled
 
 _PIECE = 1 << 15  # rows copied at once: 3 MB, one or two milliseconds

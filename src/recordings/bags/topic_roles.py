@@ -5,7 +5,7 @@ from typing import Dict, List, Optional
 
 from dead_reckoning.velocity_messages import VELOCITY_TYPES
 from recordings.bags.bag import Topic
-from sonar_processing.messages.beam_types import BEAM_TYPES, IMAGE, UNLIKELY
+from sonar_processing.beams.beam_types import BEAM_TYPES, IMAGE, UNLIKELY
 
 ODOMETRY = "nav_msgs/Odometry"
 

@@ -1,1 +1,1 @@
-"""One beam: what it holds, where it was sent, and where its bins lie."""
+"""One beam: messages of any sonar in, what it holds, where it was sent, and where its bins lie."""

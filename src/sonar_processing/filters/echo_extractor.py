@@ -16,8 +16,14 @@ from scipy.ndimage import gaussian_filter1d, uniform_filter1d
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
-from sonar_processing.filters.echo_peaks import Peaks, find_peaks, leading_edges, points_along_runs
-from sonar_processing.filters.echo_shape import EchoShape, EchoStatistics
+from sonar_processing.filters.echo_peaks import (
+    EchoShape,
+    EchoStatistics,
+    Peaks,
+    find_peaks,
+    leading_edges,
+    points_along_runs,
+)
 from sonar_processing.filters.threshold import otsu_threshold
 
 FEWEST_BEAMS = 6  # Fewer directions tell no quantile over them

@@ -7,11 +7,10 @@ from sensor_msgs.msg import LaserScan
 
 from node_support import topics
 from node_support.health import Health
-from node_support.ros.any_messages import MessageClasses
-from node_support.ros.callbacks import guarded
+from node_support.ros.callbacks import MessageClasses, guarded
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.beam_types import BEAM_TYPES, LASER_SCAN, UNLIKELY
-from sonar_processing.messages.reader import BeamMessageParameters, BeamReader, Reading, beam_type
+from sonar_processing.beams.beam_types import BEAM_TYPES, LASER_SCAN, UNLIKELY
+from sonar_processing.beams.reader import BeamMessageParameters, BeamReader, Reading, beam_type
 from underwater_map_construction.msg import SonarScanLine
 
 _BUFFER_BYTES = 2**20  # thousands of beams: what comes while the process stands still for some seconds

@@ -14,9 +14,8 @@ from node_support.errors import RefusedInput
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import Cloud, CloudSink
-from sonar_processing.ros.cloud_topics import PointsPublisher, report_broken, subscribe_to_clouds
+from sonar_processing.ros.cloud_topics import PointsPublisher, SonarPlaces, report_broken, subscribe_to_clouds
 from sonar_processing.ros.shape_messages import circle_markers, circles_message, wall_markers, walls_message
-from sonar_processing.ros.sonar_places import SonarPlaces
 from sonar_processing.shapes.circles import CircleDetector, CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetector, LineDetectorParameters
 from sonar_processing.shapes.ransac import RansacParameters

@@ -18,8 +18,7 @@ from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.cloud_topics import QUEUE_SIZE, CloudPublisher, PointsPublisher
 from sonar_processing.ros.conversions import LaserScanArrays, laser_scan_message, point_cloud
 from sonar_processing.ros.transform_filter import SonarMount, TransformFilter
-from sonar_processing.scans.assembler import RevolutionCollector, ScanAssembler
-from sonar_processing.scans.moving_state import MovingState
+from sonar_processing.scans.assembler import MovingState, RevolutionCollector, ScanAssembler
 from sonar_processing.scans.parameters import SonarToCloudParameters, VelocityType
 from sonar_processing.scans.polar_scan import TURN_FIELDS, PolarScan, planar_laser_scan, turn_cloud
 

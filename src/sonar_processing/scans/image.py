@@ -11,7 +11,7 @@ from node_support.geometry import wrapped
 from node_support.parameters import parameter
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.parameters import beam_width_parameter
-from sonar_processing.messages.reader import BeamMessageParameters
+from sonar_processing.beams.reader import BeamMessageParameters
 
 MOST_PIXELS = 3000  # A picture of 9 MB; more, at the rate of beams, is too much for a network
 _USUAL_PIXELS = 501  # Odd, so that the head is in the middle of a pixel; a bin is then about a pixel

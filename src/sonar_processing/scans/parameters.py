@@ -7,7 +7,7 @@ from node_support import topics
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.parameters import BeamCorrection, MountingParameters, beam_width_parameter
-from sonar_processing.messages.reader import BeamMessageParameters
+from sonar_processing.beams.reader import BeamMessageParameters
 
 
 class ScanMode(Enum):

@@ -7,8 +7,7 @@ from typing import List, Tuple
 import numpy as np
 
 from node_support.geometry import FULL_TURN, wrapped
-from sonar_processing.beams.beam import PlacedBeam
-from sonar_processing.beams.projection import beam_directions, bin_points, kept_bins
+from sonar_processing.beams.beam import PlacedBeam, beam_directions, bin_points, kept_bins
 from sonar_processing.cloud import Cloud
 from sonar_processing.scans.parameters import LaserPick, SonarToCloudParameters
 

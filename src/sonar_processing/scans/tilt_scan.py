@@ -10,7 +10,7 @@ import numpy as np
 from node_support.health import Health
 from node_support.parameters import ParameterError, parameter
 from sonar_processing.beams.head import SweepCounter
-from sonar_processing.messages.reader import BeamMessageParameters
+from sonar_processing.beams.reader import BeamMessageParameters
 
 JUMP_BACK = 1.0  # s: messages overtake each other by less; more is a bag that loops
 

@@ -1,1 +1,1 @@
-"""Echo models: from contacts to strengths."""
+"""From rays to echo strengths: rays, what they meet, and echo models."""

@@ -6,11 +6,10 @@ from typing import Any, Callable, Dict, Mapping, NamedTuple, Protocol, Type
 import numpy as np
 
 from node_support.parameters import ParameterSet
+from sonar_simulator.echoes.beam_tracer import BeamPattern, Contacts, RayPattern
 from sonar_simulator.echoes.physical import Physical, PhysicalParameters
+from sonar_simulator.echoes.ray_caster import Mirrors
 from sonar_simulator.echoes.thesis_models import Collision, CollisionParameters, LaserCone, LaserConeParameters
-from sonar_simulator.rays.beam_pattern import BeamPattern, RayPattern
-from sonar_simulator.rays.beam_tracer import Contacts
-from sonar_simulator.rays.ray_caster import Mirrors
 
 
 class EchoModel(Protocol):

@@ -9,9 +9,8 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.rays.beam_pattern import BeamPattern, FanWithSideLobes, RayPattern
-from sonar_simulator.rays.beam_tracer import Contacts
-from sonar_simulator.rays.ray_caster import Mirrors
+from sonar_simulator.echoes.beam_tracer import BeamPattern, Contacts, FanWithSideLobes, RayPattern
+from sonar_simulator.echoes.ray_caster import Mirrors
 from sonar_simulator.world.world import Material
 
 SOUND_SPEED = 1500.0

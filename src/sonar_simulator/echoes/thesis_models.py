@@ -8,9 +8,8 @@ from typing import Tuple
 import numpy as np
 
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.rays.beam_pattern import BeamPattern, ConePattern, RayPattern
-from sonar_simulator.rays.beam_tracer import Contacts
-from sonar_simulator.rays.ray_caster import Mirrors
+from sonar_simulator.echoes.beam_tracer import BeamPattern, ConePattern, Contacts, RayPattern
+from sonar_simulator.echoes.ray_caster import Mirrors
 
 
 @dataclass(frozen=True)

@@ -19,8 +19,8 @@ from node_support.ros.transforms import JointAngle
 from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_simulator.echoes.echo_model import make_echo_model
+from sonar_simulator.echoes.ray_grid import Rays, ScanLayout, rays_of_points, rays_of_scan
 from sonar_simulator.gazebo_beams import GROUPS, GazeboBeams, GazeboSonarParameters, HeadMode, RayScan
-from sonar_simulator.rays.ray_grid import Rays, ScanLayout, rays_of_points, rays_of_scan
 from sonar_simulator.ros.publisher import MESSAGES
 from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead

@@ -18,9 +18,8 @@ from node_support.ros.node import run
 from node_support.timing import Pace, UsualInterval
 from sonar_simulator.ros.publisher import SimulatorPublisher, TrueSonar
 from sonar_simulator.simulation.moment_messages import map_origin
-from sonar_simulator.simulation.simulation import Drive, Head, Moment
-from sonar_simulator.simulation.simulation_setup import Settings, make_setup
-from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription
+from sonar_simulator.simulation.robot import DescriptionError, RobotDescription
+from sonar_simulator.simulation.simulation import Drive, Head, Moment, Settings, make_setup
 from underwater_map_construction.msg import StampedIntensityCloud
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0

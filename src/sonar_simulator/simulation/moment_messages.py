@@ -6,8 +6,7 @@ import numpy as np
 
 from node_support import topics
 from recordings.bags.messages import Messages, Placing
-from sonar_simulator.simulation.simulation import Instruments, Moment, Ping
-from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME
+from sonar_simulator.simulation.simulation import BASE_FRAME, SONAR_FRAME, Instruments, Moment, Ping
 
 ODOM_FRAME = "odom"
 MAP_FRAME = "map"

@@ -14,14 +14,12 @@ from tqdm import tqdm
 from node_support import topics
 from node_support.files import check_output, package_folder, whole_file
 from node_support.help import CommandLine
-from node_support.parameter_files import assigned_values, read_values
-from node_support.parameters import ParameterError
-from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
+from node_support.parameters import ParameterError, assigned_values, read_values
 from recordings.bags.messages import Placing
+from recordings.bags.writers import COMPRESSIONS, BagWriter
 from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
-from sonar_simulator.simulation.simulation import Drive, Moment
-from sonar_simulator.simulation.simulation_setup import BASE_FRAME, SONAR_FRAME, Settings, Setup, make_setup
-from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription, tilted
+from sonar_simulator.simulation.robot import DescriptionError, RobotDescription, tilted
+from sonar_simulator.simulation.simulation import BASE_FRAME, SONAR_FRAME, Drive, Moment, Settings, Setup, make_setup
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head

@@ -8,11 +8,10 @@ import numpy as np
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer
 from sonar_simulator.echoes.echo_model import EchoModel
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.echoes.thesis_models import LaserCone, LaserConeParameters
-from sonar_simulator.rays.beam_pattern import BeamPattern
-from sonar_simulator.rays.beam_tracer import BeamTracer
-from sonar_simulator.rays.ray_caster import RayCaster
 from sonar_simulator.world.world import World, WorldError
 from sonar_simulator.world.world_file import load_world
 

@@ -7,8 +7,7 @@ import numpy as np
 
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.recording import Recording, scans_of
-from mlsm_manager.offline.replay import replay
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import ReplayParameters, replay
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam

@@ -6,8 +6,7 @@ from benchmarks import fault_makers as broken
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
-from mlsm_manager.offline.bag_mapping import mapped_bag
-from mlsm_manager.offline.causes import with_odometry_mended
+from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Track

@@ -12,7 +12,7 @@ from PIL import Image
 from georeferencing.origin import STORED, Origin
 from mlsm_manager.surface_map.export.charts import write_geotiff, write_tiles
 from mlsm_manager.surface_map.export.formats import ExportOptions, export
-from mlsm_manager.surface_map.export.ridges import counts, ridges
+from mlsm_manager.surface_map.export.rasters import counts, ridges
 from mlsm_manager.surface_map.map_file import ExportError, Layer, StoredMap
 
 RESOLUTION = 0.5

@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mlsm_manager.offline.cluster import Cluster
-from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
+from mlsm_manager.offline.each import INDEX, Cluster, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.index_page import Job, Outcome, Standing
 from recordings.bags.bag import RecordingError
 
@@ -102,7 +101,7 @@ def test_nothing_is_called_fine_on_the_page_that_was_not_measured(answers, match
 
 def test_a_cluster_that_is_not_there_is_told_before_the_first_map(tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    monkeypatch.setattr("mlsm_manager.offline.cluster.TIMEOUT", 0.5)
+    monkeypatch.setattr("mlsm_manager.offline.each.TIMEOUT", 0.5)
     with pytest.raises(RecordingError, match=r"--scheduler tcp://127\.0\.0\.1:9: "):
         map_each([ROOT / "test/data/basin.bag"], tmp_path / "maps", [], "tcp://127.0.0.1:9")
     assert not list((tmp_path / "maps").iterdir())
@@ -114,7 +113,7 @@ def test_a_folder_that_a_worker_does_not_see_is_told(tmp_path, cluster):
 
 
 def test_a_cluster_without_workers_ends_in_one_line_and_says_what_stays(tmp_path, cluster, monkeypatch):
-    monkeypatch.setattr("mlsm_manager.offline.cluster.PATIENCE", 0.0)
+    monkeypatch.setattr("mlsm_manager.offline.each.PATIENCE", 0.0)
     with Cluster(cluster.scheduler_address, tmp_path) as workers:
         workers.check("all stays")
         cluster.scale(0)

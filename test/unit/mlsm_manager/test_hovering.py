@@ -10,7 +10,6 @@ from made_harbour import CANAL, along_canal, tour
 from made_models import followed
 
 from mlsm_manager.hovering.compiled_particles import Echoes
-from mlsm_manager.hovering.echoes import ACROSS, ALONG, AROUND, FARTHEST
 from mlsm_manager.hovering.particle_filter import (
     FADING,
     groups_of,
@@ -21,7 +20,7 @@ from mlsm_manager.hovering.particle_filter import (
     pulls_of,
     weighed,
 )
-from mlsm_manager.hovering.particles import Particles, drawn, led
+from mlsm_manager.hovering.particles import ACROSS, ALONG, AROUND, FARTHEST, Particles, drawn, led
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
 from mlsm_manager.joint_solver.batch_solver import fit_path

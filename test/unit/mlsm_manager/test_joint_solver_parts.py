@@ -15,8 +15,7 @@ from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, SparseSolution, State
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
-from mlsm_manager.joint_solver.run_log import parts_of
-from mlsm_manager.joint_solver.stored_arrays import stacked, unstacked
+from mlsm_manager.joint_solver.run_log import parts_of, stacked, unstacked
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
 from mlsm_manager.scan_matching.scan import Scan, Track
 

@@ -7,9 +7,8 @@ from made_loops import DEAF, astray
 from made_models import followed, solver_parameters
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.live_loops import Bend
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.loops import Loop
+from mlsm_manager.joint_solver.loops import Bend, Loop
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.run_log import RunLog

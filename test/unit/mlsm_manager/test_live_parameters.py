@@ -16,7 +16,7 @@ from roslaunch.xmlloader import XmlLoader
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import MapInput, MlsmCoreParameters
 from mlsm_manager.offline.findings import Calibration
-from mlsm_manager.offline.replay_parameters import NODES, ReplayParameters, live_text, live_values, replay_values
+from mlsm_manager.offline.replay import NODES, ReplayParameters, live_text, live_values, replay_values
 from node_support.parameters import ParameterError, describe
 
 ROOT = Path(__file__).resolve().parents[3]

@@ -10,8 +10,15 @@ import yaml
 from made_maps import map_with, random_map
 from PIL import Image
 
-from mlsm_manager.surface_map.export.formats import ExportOptions, export, write_pcd, write_ply
-from mlsm_manager.surface_map.export.octomap import block_voxels, octree, write_octree
+from mlsm_manager.surface_map.export.formats import (
+    ExportOptions,
+    block_voxels,
+    export,
+    octree,
+    write_octree,
+    write_pcd,
+    write_ply,
+)
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors, box_mesh
 from mlsm_manager.surface_map.export.rasters import (
     FREE,

@@ -20,9 +20,9 @@ from visualization_msgs.msg import Marker, MarkerArray
 from mlsm_manager.ros.map_publisher import CLOUD_FIELDS, has_octomap_messages, map_cloud, octomap_message
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
 from mlsm_manager.ros.status_teller import ellipse, wrapped_text
-from mlsm_manager.surface_map.export.octomap import octree, write_octree
+from mlsm_manager.surface_map.cells import THINNEST, TILE_BITS, box_lists, box_size, box_type
+from mlsm_manager.surface_map.export.formats import octree, write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
-from mlsm_manager.surface_map.tiles import THINNEST, TILE_BITS, box_lists, box_size, box_type
 
 HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
 MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.9), (5.0, 5.01)]

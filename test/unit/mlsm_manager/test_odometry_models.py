@@ -9,9 +9,9 @@ from made_models import COMPASS, followed
 
 from mlsm_manager.joint_solver.batch_solver import solved
 from mlsm_manager.joint_solver.estimate import scale_covariance
-from mlsm_manager.joint_solver.heading_errors import by_heading
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, solution_of
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.velocity_models import by_heading
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track

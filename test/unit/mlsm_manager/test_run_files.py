@@ -13,11 +13,10 @@ from made_maps import blocks_of
 from georeferencing.asked import AskedOrigin
 from georeferencing.origin import STORED as STORED_ORIGIN
 from georeferencing.origin import Origin
-from mlsm_manager.offline.charts import origin_of_fixes
+from mlsm_manager.offline.charts import origin_of_fixes, satellite_fixes
 from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth, scans_of
-from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, replay
-from mlsm_manager.offline.replay_parameters import ReplayParameters
+from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, ReplayParameters, replay
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.verdict import Answer, Verdict
@@ -25,8 +24,7 @@ from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, matrices
 from recordings.bags.bag import RecordingError
-from recordings.bags.bag_writer import BagWriter
-from recordings.satellite_fixes import satellite_fixes
+from recordings.bags.writers import BagWriter
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import FEWEST_BEAMS, EchoExtractor, EchoExtractorParameters

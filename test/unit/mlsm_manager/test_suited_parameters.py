@@ -13,7 +13,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.updates import report_turn
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import Recording
-from mlsm_manager.offline.replay_parameters import ReplayParameters, replay_values
+from mlsm_manager.offline.replay import ReplayParameters, replay_values
 from mlsm_manager.offline.suited_parameters import odometry_of, with_cells, with_odometry
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.health import Health

@@ -12,8 +12,14 @@ from thesis_results.moves import displaced_fix
 from thesis_results.thesis_scans import ThesisScans, thesis_estimator
 
 from mlsm_manager.scan_matching.scan import MatchStatus
-from mlsm_manager.thesis_matching.registration import ClosestBlocks, belonging, rigid_motion, translate_segments
-from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
+from mlsm_manager.thesis_matching.thesis_matcher import (
+    ClosestBlocks,
+    ThesisMatcher,
+    ThesisMatcherParameters,
+    belonging,
+    rigid_motion,
+    translate_segments,
+)
 from node_support.geometry import composed, transformed
 
 POSTS = np.array([[4.0, 0.0], [0.0, 6.0], [-5.0, -1.0], [2.0, -7.0], [8.0, 8.0]])

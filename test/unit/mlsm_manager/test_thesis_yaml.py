@@ -9,7 +9,7 @@ from test_live_parameters import launched
 
 from mlsm_manager.offline.map_bag import map_bag, map_bag_arguments
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
-from sonar_simulator.simulation.simulation_setup import GROUPS
+from sonar_simulator.simulation.simulation import GROUPS
 
 ROOT = Path(__file__).resolve().parents[3]
 TEXT = (ROOT / "yaml/thesis.yaml").read_text()

@@ -10,7 +10,7 @@ HOLES = """
 import resource, sys
 sys.path.insert(0, sys.argv[1])
 import numpy as np
-from node_support.memory import give_back, hold_little
+from node_support.ros.node import give_back, hold_little
 def held():
     return int(open("/proc/self/statm").read().split()[1]) * resource.getpagesize() / 1e6
 hold_little()

@@ -13,8 +13,15 @@ from hypothesis import strategies as st
 from parameter_text import default_yaml, markdown_table
 
 from node_support import parameters as parameters_module
-from node_support.parameter_files import assigned_values, read_values
-from node_support.parameters import ParameterError, ParameterSet, describe, parameter, with_defaults
+from node_support.parameters import (
+    ParameterError,
+    ParameterSet,
+    assigned_values,
+    describe,
+    parameter,
+    read_values,
+    with_defaults,
+)
 from node_support.ros.reconfigure_description import generator
 
 

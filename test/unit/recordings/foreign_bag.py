@@ -5,7 +5,7 @@ from contextlib import contextmanager
 import numpy as np
 
 from node_support.files import whole_file
-from recordings.bags.bag_writer import BagWriter
+from recordings.bags.writers import BagWriter
 
 BEAMS = 200
 START, END = 100.0, 110.0

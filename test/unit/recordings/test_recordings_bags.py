@@ -15,7 +15,7 @@ from old_bag import with_old_types
 
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import Bag, RecordingError
-from recordings.bags.bag_writer import COMPRESSIONS, BagWriter
+from recordings.bags.writers import COMPRESSIONS, BagWriter
 from recordings.reader import Request
 
 BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from recordings.beam_survey import beam_lines
 from recordings.beams import RecordedBeams
 from recordings.motion.sweep_shifts import SweepMotion, sweep_shifts
+from recordings.survey import beam_lines
 from sonar_processing.beams.beam import Beam
 
 STEP, BINS, RESOLUTION = np.radians(1.8), 300, 0.05

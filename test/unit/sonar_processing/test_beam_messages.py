@@ -25,8 +25,8 @@ from sonar_messages import (
 )
 
 from node_support.errors import RefusedInput
-from sonar_processing.messages.beam_types import BEAM_TYPES, IMAGE, LASER_SCAN, OWN, POINT_CLOUD
-from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
+from sonar_processing.beams.beam_types import BEAM_TYPES, IMAGE, LASER_SCAN, OWN, POINT_CLOUD
+from sonar_processing.beams.reader import BeamMessageParameters, BeamReader
 
 ECHO, PING_360 = "ping360_sonar/SonarEcho", "bluerobotics_sonar_msgs/SonarPing360"
 MICRON = "micron_driver_ros/ScanLine"

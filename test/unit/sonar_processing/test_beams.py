@@ -12,9 +12,8 @@ from hypothesis import strategies as st
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix, wrapped
 from node_support.parameters import ParameterError
-from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.beam import Beam, project_beams
 from sonar_processing.beams.parameters import BeamCorrection, MountingParameters
-from sonar_processing.beams.projection import project_beams
 from sonar_processing.cloud import Cloud
 
 ANGLES = st.floats(-7.0, 7.0)

@@ -19,8 +19,8 @@ from std_msgs.msg import Header
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix, quaternion_of
 from node_support.ros.transforms import matrix_from_message
+from sonar_processing.beams.reader import BeamMessageParameters, BeamReader
 from sonar_processing.cloud import Cloud
-from sonar_processing.messages.reader import BeamMessageParameters, BeamReader
 from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
     cloud_from_message,

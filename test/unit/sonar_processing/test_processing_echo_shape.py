@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sonar_processing.filters.echo_shape import EchoShape, EchoStatistics
+from sonar_processing.filters.echo_peaks import EchoShape, EchoStatistics
 
 
 def heard(*turns, resolution=0.1):

@@ -5,7 +5,7 @@ import math
 import pytest
 
 from node_support.errors import RefusedInput
-from sonar_processing.scans.moving_state import MovingState
+from sonar_processing.scans.assembler import MovingState
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 PARAMETERS = SonarToCloudParameters(still_speed=0.05, still_turn_rate=0.01)

@@ -7,8 +7,8 @@ import pytest
 import rosbag
 import yaml
 
+from sonar_simulator.simulation.scripted_vehicle import load_script
 from sonar_simulator.simulation.simulate_bag import main
-from sonar_simulator.vehicle.scripted_vehicle import load_script
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = "moves: [{wait: 1}, {x: 2, y: 1, yaw_deg: 40, seconds: 4}, {tilt_deg: 20}, {wait: 1}]"

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
 from node_support.geometry import yaw_of
-from sonar_simulator.vehicle.commanded_vehicle import CommandedVehicle, VehicleParameters
+from sonar_simulator.simulation.commanded_vehicle import CommandedVehicle, VehicleParameters
 
 PARAMETERS = VehicleParameters()
 SURGE = np.array([0.8, 0.0, 0.0, 0.0, 0.0, 0.0])

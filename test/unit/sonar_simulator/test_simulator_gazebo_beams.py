@@ -6,8 +6,8 @@ import pytest
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.echoes.ray_grid import Rays
 from sonar_simulator.gazebo_beams import GazeboBeams, GazeboSonarParameters, RayScan
-from sonar_simulator.rays.ray_grid import Rays
 from sonar_simulator.simulation.sonar_head import SonarHead
 
 ELEVATIONS = np.radians(np.linspace(-11.0, 11.0, 15))

@@ -10,11 +10,10 @@ from hypothesis import strategies as st
 from least_distance import nearest_range
 
 from node_support.geometry import pose_matrix
+from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer, head_turns
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.rays.beam_pattern import BeamPattern, head_turns
-from sonar_simulator.rays.beam_tracer import BeamTracer
-from sonar_simulator.rays.nearest_surface import NearestSurface
-from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.echoes.nearest_surface import NearestSurface
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import SonarHead, SonarParameters
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_file import load_world

@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from node_support.geometry import pose_matrix, yaw_of
-from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
-from sonar_simulator.vehicle.scripted_vehicle import VehicleScript, VehicleState
+from sonar_simulator.simulation.odometry import Odometry, OdometryParameters
+from sonar_simulator.simulation.scripted_vehicle import VehicleScript, VehicleState
 
 START = {"x": 10.0, "y": 5.0, "z": -2.0, "yaw_deg": 20.0}
 WAY = VehicleScript.from_yaml_data(

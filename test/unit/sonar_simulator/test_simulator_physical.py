@@ -3,9 +3,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sonar_simulator.echoes.beam_tracer import Contacts
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.echoes.physical import Physical, PhysicalParameters, Scattering, absorption
-from sonar_simulator.rays.beam_tracer import Contacts
 from sonar_simulator.world.world import MATERIALS
 
 STILL = {"speckle": 0.0, "noise_level_db": -300.0, "volume_scattering_db": -300.0, "ringing": 0.0}

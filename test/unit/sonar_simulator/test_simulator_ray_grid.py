@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
-from sonar_simulator.rays.ray_grid import Rays, ScanLayout, contacts_of_grid, rays_of_points, rays_of_scan
+from sonar_simulator.echoes.ray_grid import Rays, ScanLayout, contacts_of_grid, rays_of_points, rays_of_scan
 
 MAX_RANGE = 50.0
 

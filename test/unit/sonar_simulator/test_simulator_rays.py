@@ -9,9 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry import pose_matrix
-from sonar_simulator.rays.beam_pattern import BeamPattern, FanWithSideLobes
-from sonar_simulator.rays.beam_tracer import BeamTracer
-from sonar_simulator.rays.ray_caster import Mirrors, RayCaster, legs
+from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer, FanWithSideLobes
+from sonar_simulator.echoes.ray_caster import Mirrors, RayCaster, legs
 from sonar_simulator.world.world import MATERIALS, MissingPackageError, Shape, World
 
 HALF = np.array([60.0, 25.0, 5.0])

@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_simulator.vehicle.robot import DescriptionError, RobotDescription, Servo, ServoParameters, tilted
+from sonar_simulator.simulation.robot import DescriptionError, RobotDescription, Servo, ServoParameters, tilted
 
 CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())
 CHAIN = """<robot name="r">

@@ -9,9 +9,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry import pose_matrix, yaw_of
-from sonar_simulator.rays.ray_caster import RayCaster
-from sonar_simulator.vehicle.odometry import Odometry, OdometryParameters
-from sonar_simulator.vehicle.scripted_vehicle import ScriptError, VehicleScript, load_script
+from sonar_simulator.echoes.ray_caster import RayCaster
+from sonar_simulator.simulation.odometry import Odometry, OdometryParameters
+from sonar_simulator.simulation.scripted_vehicle import ScriptError, VehicleScript, load_script
 from sonar_simulator.world.world_file import load_world
 
 MOVES = [

@@ -6,9 +6,8 @@ import pytest
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_simulator.simulation.simulation import Drive
-from sonar_simulator.simulation.simulation_setup import Settings, make_setup
-from sonar_simulator.vehicle.robot import RobotDescription
+from sonar_simulator.simulation.robot import RobotDescription
+from sonar_simulator.simulation.simulation import Drive, Settings, make_setup
 
 ROOT = Path(__file__).resolve().parents[3]
 CHARLE = RobotDescription.from_file(ROOT / "urdf/charle.urdf")

@@ -10,9 +10,9 @@ import pytest
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
+from sonar_simulator.echoes.beam_tracer import BeamPattern, head_turns
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.rays.beam_pattern import BeamPattern, head_turns
-from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters, WorldEchoes, world_echoes
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_file import load_sdf

@@ -7,9 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from sonar_simulator.echoes.beam_tracer import BeamPattern, Contacts
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
-from sonar_simulator.rays.beam_pattern import BeamPattern
-from sonar_simulator.rays.beam_tracer import Contacts
 
 NOISE_FREE = {"spread": 0.0, "noise_echoes": 0}
 

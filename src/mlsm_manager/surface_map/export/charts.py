@@ -8,8 +8,7 @@ import numpy as np
 
 from georeferencing.origin import Origin
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.export.rasters import elevation
-from mlsm_manager.surface_map.export.ridges import counts, ridges
+from mlsm_manager.surface_map.export.rasters import counts, elevation, ridges
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support.files import whole_file, write_whole
 

@@ -8,8 +8,7 @@ from typing import Any, List, Mapping, NamedTuple, Protocol, Sequence, Tuple, Un
 import numpy as np
 
 from node_support.geometry import pose_matrix
-from node_support.parameter_files import read_values
-from node_support.parameters import ParameterError, ParameterSet, parameter
+from node_support.parameters import ParameterError, ParameterSet, parameter, read_values
 
 
 @dataclass(frozen=True)

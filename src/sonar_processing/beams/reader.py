@@ -8,8 +8,8 @@ from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_stamp
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
-from sonar_processing.messages.beam_fields import BeamFields
-from sonar_processing.messages.beam_types import BEAM_TYPES, OWN, AngleUnit, BeamType, RadiansOrGradians, ros1_name
+from sonar_processing.beams.beam_fields import BeamFields
+from sonar_processing.beams.beam_types import BEAM_TYPES, OWN, AngleUnit, BeamType, RadiansOrGradians, ros1_name
 
 _REFUSED = "beams refused"
 

@@ -14,8 +14,15 @@ import numpy as np
 
 from node_support.errors import RefusedInput
 from node_support.headers import stamp_ns
-from sonar_processing.messages.beam_fields import BeamFields, length_of_bins, speed_of_sound_of, strengths_of
-from sonar_processing.messages.image_messages import TurningImage, projected_sonar_image, raw_sonar_image
+from sonar_processing.beams.beam_fields import (
+    BeamFields,
+    TurningImage,
+    length_of_bins,
+    projected_sonar_image,
+    raw_sonar_image,
+    speed_of_sound_of,
+    strengths_of,
+)
 
 _VOTES = 25  # Beams that are looked back on: more than the seven that gradians spend below 2 pi in a turn
 _ROUNDING = 1e-3  # Of a float32 that holds an angle

@@ -7,7 +7,7 @@ from typing import Optional, Tuple
 import numpy as np
 
 from node_support.errors import RefusedInput
-from sonar_simulator.rays.beam_tracer import Contacts
+from sonar_simulator.echoes.beam_tracer import Contacts
 from sonar_simulator.world.world import DEFAULT_MATERIAL, Material, material_of_reflection
 
 _NO_BEARING = 1e-6  # rad: less than any ray sensor's step; all rays of one column

@@ -8,7 +8,7 @@ import numpy as np
 
 from node_support.geometry import pose_matrix, rotated, unwrapped, yaw_of
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.vehicle.scripted_vehicle import VehicleState
+from sonar_simulator.simulation.scripted_vehicle import VehicleState
 
 _NOISE_TIME = 1.0  # s: correlation time, about that of a vehicle's own dynamics
 

@@ -6,7 +6,7 @@ from typing import Iterator, Tuple
 
 import numpy as np
 
-from sonar_simulator.rays.nearest_surface import NearestSurface
+from sonar_simulator.echoes.nearest_surface import NearestSurface
 from sonar_simulator.world.world import MissingPackageError, World
 
 # Embree returns 1e37 where a ray hits nothing.

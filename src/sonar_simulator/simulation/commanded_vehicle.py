@@ -8,7 +8,7 @@ import numpy as np
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.vehicle.scripted_vehicle import VehicleState
+from sonar_simulator.simulation.scripted_vehicle import VehicleState
 
 _STEP = 0.01  # s: short against the time in which the vehicle reaches its speed
 _STILL_SPEED = 1e-3  # m/s and rad/s: slower is the tail of an exponential, and the vehicle rests

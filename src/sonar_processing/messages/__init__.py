@@ -1,1 +1,0 @@
-"""Messages of sonars, by type: plain attribute objects in, beams out."""

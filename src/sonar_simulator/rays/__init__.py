@@ -1,1 +1,0 @@
-"""Rays, the surfaces that they hit, and mirrors."""

@@ -1,1 +1,0 @@
-"""The simulated vehicle: motion, odometry, servo and robot description."""
