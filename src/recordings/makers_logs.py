@@ -6,6 +6,7 @@ from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
+from georeferencing.fixes import Fix
 from imagenex_852_driver.log_file import LogReader, timed
 from imagenex_852_driver.reply import head_angle as imagenex_angle
 from node_support.errors import RefusedInput
@@ -20,7 +21,7 @@ from recordings.bags.bag import RecordingError
 from recordings.beam_table import beams_of_table, is_beam_table
 from recordings.beams import RecordedBeams
 from recordings.motion.pose_track import PoseTrack
-from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_headings
+from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_fixes, vehicle_headings
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_fields import USUAL_SPEED_OF_SOUND
 
@@ -50,6 +51,11 @@ def makers_beams(path: Path) -> RecordedBeams:
 def makers_headings(path: Path) -> Optional[PoseTrack]:
     """Return the vehicle's orientations, at the origin, of a log that holds some. Raises RecordingError."""
     return vehicle_headings(path) if is_ping_viewer_next(path) else None
+
+
+def makers_fixes(path: Path) -> List[Fix]:
+    """Return the vehicle's places on the Earth of a log that holds some. Raises RecordingError."""
+    return vehicle_fixes(path) if is_ping_viewer_next(path) else []
 
 
 def _reader(path: Path) -> Optional[_Reader]:

@@ -1,6 +1,7 @@
 """Recordings of Ping Viewer Next: MCAP files with JSON messages of the devices and of the vehicle's attitude.
 
-Source: src/device/recording and src/vehicle in bluerobotics/ping-viewer-next; no recording of it was at hand.
+Source: src/device/recording and src/vehicle in bluerobotics/ping-viewer-next; no recording of it was at hand. Its
+latitude and longitude are those of the autopilot's estimator (GLOBAL_POSITION_INT), 0 while that has none.
 """
 
 import json
@@ -13,6 +14,7 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
+from georeferencing.fixes import Fix
 from node_support.geometry import pose_matrix, quaternion_of
 from ping360_driver.messages import MessageError, MessageId
 from ping360_driver.scan_command import Beam as HeadBeam
@@ -23,6 +25,7 @@ from recordings.motion.pose_track import LATEST_NS, PoseTrack
 _MAGIC = b"\x89MCAP0\r\n"
 _ROS2 = b"ros2"
 _TOPIC = re.compile(r"/?(device_[^/]+)/(Ping360|VehicleData)")
+_AT_SURFACE = 1.0  # m below the highest altitude: deeper no satellite is heard, and the estimator reckons on
 
 
 def is_ping_viewer_next(path: Path) -> bool:
@@ -79,6 +82,17 @@ def vehicle_headings(path: Path) -> Optional[PoseTrack]:
         return None
     track = PoseTrack.sorted_from(np.array(stamps), np.zeros((len(stamps), 3)), np.array(rotations))
     return track.turned_up()
+
+
+def vehicle_fixes(path: Path) -> List[Fix]:
+    """Return where the vehicle was while at the surface. Raises RecordingError."""
+    rows = []
+    for _, time_ns, content in _messages(path, "VehicleData"):
+        place = [content.get(name) for name in ("lat", "lon", "alt")]
+        if all(isinstance(value, (int, float)) for value in place) and any(place[:2]):
+            rows.append((time_ns * 1e-9, *place))
+    highest = max((alt for *_, alt in rows), default=0.0)
+    return [Fix(time, lat, lon) for time, lat, lon, alt in rows if alt > highest - _AT_SURFACE]
 
 
 def _messages(path: Path, name: str) -> Iterator[Tuple[str, int, Dict[str, Any]]]:

@@ -22,7 +22,7 @@ from node_support.errors import RefusedInput
 from node_support.files import write_whole
 from node_support.topics import CHART_POSITION
 from recordings.bags.bag import Bag, RecordingError
-from recordings.makers_logs import is_makers_log
+from recordings.makers_logs import is_makers_log, makers_fixes
 from recordings.motion.autopilot_log import fixes_of_autopilot, is_autopilot_log
 from recordings.motion.motion_table import is_table
 
@@ -30,13 +30,15 @@ _TYPE = "sensor_msgs/NavSatFix"
 
 
 def satellite_fixes(path: Path) -> List[Fix]:
-    """Return the fixes in a bag or in an autopilot's log, those of the topic with most; none in any other file.
+    """Return the fixes in a bag, those of the topic with most, or in a log; none in a file that holds no positions.
 
     Messages of receivers without a fix are left out. Raises RecordingError.
     """
     if is_autopilot_log(path):
         return fixes_of_autopilot(path)
-    if is_table(path) or is_makers_log(path):
+    if is_makers_log(path):
+        return makers_fixes(path)
+    if is_table(path):
         return []
     fixes: List[Fix] = []
     with Bag(path) as bag:

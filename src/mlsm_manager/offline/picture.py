@@ -23,6 +23,7 @@ from node_support.files import write_whole
 _WALL, _POINTS, _INK, _GRATICULE = "#8c2318", "#fcc3ab", "#333333", "#5b7fa6"
 _DOUBT_COLOR = "#cc3377"
 _MOST_ELLIPSES = 40
+_ROOM = 0.25  # of the larger side of map and paths: for ellipses on each side
 _LINE_STYLES = ("-", "--", ":", "-.")
 
 
@@ -47,7 +48,6 @@ def draw_map(
         _draw_uncertainty(axes, best, uncertainty)
     axes.set_aspect("equal")
     axes.set(xlabel="x [m]", ylabel="y [m]", title=title)
-    axes.autoscale_view()
     if origin is not None:
         _draw_graticule(axes, origin)
     _draw_scale(axes, origin)
@@ -59,11 +59,19 @@ def draw_map(
 
 
 def _draw_uncertainty(axes: Axes, path: Trajectory, uncertainty: Uncertainty) -> None:
+    """Draw ellipses; they widen the view by a quarter on each side at most, so that the map stays readable."""
+    axes.autoscale_view()
+    low, high = np.transpose([axes.get_xlim(), axes.get_ylim()])
     axes.plot(*uncertainty.ellipses(path, _MOST_ELLIPSES).T, color=_DOUBT_COLOR, linewidth=0.8, zorder=6)
     axes.plot([], [], "o", markerfacecolor="none", color=_DOUBT_COLOR, label="two standard deviations")
     doubtful = uncertainty.doubtful_parts(path)
     if len(doubtful):
         axes.plot(*doubtful.T, color=_DOUBT_COLOR, linewidth=6.0, alpha=0.35, label="doubtful", zorder=4)
+    axes.autoscale_view()
+    room = _ROOM * (high - low).max()
+    wide_low, wide_high = np.transpose([axes.get_xlim(), axes.get_ylim()])
+    (left, bottom), (right, top) = np.maximum(wide_low, low - room), np.minimum(wide_high, high + room)
+    axes.set(xlim=(left, right), ylim=(bottom, top))
 
 
 def _draw_blocks(axes: Axes, blocks: Blocks) -> None:

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from mcap.writer import CompressionType, Writer
 
+from mlsm_manager.offline.charts import satellite_fixes
 from recordings.bags.bag import RecordingError
 from recordings.makers_logs import is_makers_log
 from recordings.motion.vehicle_motion import MotionSource
@@ -19,7 +20,7 @@ BEAM = {
 }  # fmt: skip
 
 
-def write(path, with_vehicle=True, beams=400, device="0a", topic="Ping360", **changes):
+def write(path, with_vehicle=True, beams=400, device="0a", topic="Ping360", places=(), **changes):
     """Write a turn of a head on a vehicle that turns from north to east."""
     with path.open("wb") as file:
         writer = Writer(file, chunk_size=50_000, compression=CompressionType.NONE)
@@ -31,7 +32,8 @@ def write(path, with_vehicle=True, beams=400, device="0a", topic="Ping360", **ch
             time = START + index * SECOND // 20
             contents = [{**BEAM, "angle": index % 400, "data": [index % 256] * 300, **changes}]
             yaw = np.pi / 2.0 * index / beams
-            contents += [{"roll": 0.0, "pitch": 0.1, "yaw": yaw, "alt": -2.0, "lat": 41.0, "lon": 3.0}] * with_vehicle
+            place = dict(zip(("alt", "lat", "lon"), places[index])) if places else {}
+            contents += [{"roll": 0.0, "pitch": 0.1, "yaw": yaw, **place}] * with_vehicle
             for channel, content in zip(channels, contents):
                 writer.add_message(channel, time, json.dumps(content).encode(), time)
         writer.finish()
@@ -55,6 +57,14 @@ def test_beams_and_headings_come_from_one_file(turn):
     yaws = np.arctan2(poses[:, 1, 0], poses[:, 0, 0])
     assert (yaws[1], yaws[-1]) == (pytest.approx(0.0, abs=0.01), pytest.approx(-np.pi / 2, abs=0.01))
     assert np.arcsin(-poses[200, 2, 0]) == pytest.approx(-0.1, abs=1e-3)  # Nose up
+
+
+def test_positions_while_at_the_surface_are_fixes_of_satellites(tmp_path):
+    """In a lake 200 m above the sea; the estimator begins without a position, and dives after the third."""
+    places = [(200.0, 0.0, 0.0), (200.2, 41.0, 3.0), (199.9, 41.00001, 3.0), (195.0, 41.1, 3.0)]
+    fixes = satellite_fixes(write(tmp_path / "a.mcap", beams=4, places=places))
+    assert [(fix.latitude_deg, fix.longitude_deg) for fix in fixes] == [(41.0, 3.0), (41.00001, 3.0)]
+    assert fixes[0].time == pytest.approx((START + SECOND // 20) / SECOND)
 
 
 def test_without_the_vehicle_nothing_is_said_of_the_motion(tmp_path):
