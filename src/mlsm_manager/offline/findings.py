@@ -17,7 +17,7 @@ from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Cause, widened
-from mlsm_manager.self_check.headline import headline
+from mlsm_manager.self_check.headline import headline, is_told
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.odometry_checks import odometry_decided
 from mlsm_manager.self_check.path_checks import (
@@ -135,9 +135,10 @@ class Trust:
         return _radii(self.covariances)
 
     @property
-    def uncertainty(self) -> Uncertainty:
-        """What picture and report show of it."""
-        return Uncertainty(self.times, self.covariances, self.doubtful)
+    def uncertainty(self) -> Optional[Uncertainty]:
+        """What picture and report show of it; None where nothing can be said of the position."""
+        told = is_told(self.verdicts, self.matched)
+        return Uncertainty(self.times, self.covariances, self.doubtful) if told else None
 
     @property
     def doubtful(self) -> np.ndarray:
@@ -157,7 +158,8 @@ class Trust:
             for verdict in self.verdicts
         }
         minutes = per_minute(self.times, self.deviations)
-        stated = [None if np.isnan(value) else round(float(value), 2) for value in minutes]
+        told = np.isfinite(minutes) & (self.uncertainty is not None)
+        stated = [round(float(value), 2) if known else None for value, known in zip(minutes, told)]
         causes = [cause.to_mapping(float(self.times[0])) for cause in self.causes]
         return {"causes": causes, "checks": checks, "deviation_per_minute": stated}
 

@@ -13,7 +13,7 @@ from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
 from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, positions_at, trajectories_of
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.headline import WITHIN, is_told
+from mlsm_manager.self_check.headline import WITHIN
 from mlsm_manager.self_check.verdict import counted
 from node_support.geometry import composed, inverse, transformed
 
@@ -130,7 +130,7 @@ def _depth(heights: np.ndarray) -> str:
 def _accuracy(mapped: MappedBag) -> str:
     """Return within what the position is known with 95 % along the whole path, in the map and on the Earth."""
     run, trust, origin = mapped.run, mapped.run.trust, mapped.run.stored.origin
-    if trust is None or not is_told(trust.verdicts, trust.matched):
+    if trust is None or trust.uncertainty is None:
         return "nothing can be said of it"
     told = f"within {WITHIN * trust.deviations.max():.1f} m in the map"
     if origin is None or not origin.covariance.any():

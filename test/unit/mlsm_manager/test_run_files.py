@@ -149,9 +149,11 @@ def test_stretches_are_doubtful_where_a_check_fires():
 
 
 def test_what_it_cannot_tell_is_null_in_json():
-    told = trust_of(SHORT).to_mapping()
+    told = trust_of(FINE, SHORT).to_mapping()
     assert told["checks"]["length"]["value"] is None
     assert told["deviation_per_minute"] == [5.0, None, None, 5.0]
+    assert trust_of(SHORT).uncertainty is None
+    assert trust_of(SHORT).to_mapping()["deviation_per_minute"] == [None] * 4
     json.dumps(told, allow_nan=False)
 
 
