@@ -27,6 +27,7 @@ STUDIES = (
     "canals",
     "chart",
     "faults",
+    "heads",
     "link",
     "logs",
     "long_run",

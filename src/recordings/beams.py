@@ -22,6 +22,7 @@ class RecordedBeams:
     """beams: in the order of the recording. moving: whether the vehicle moved then. refused: messages without a beam.
 
     notes: what was assumed, as sentences. soundings: (n, 2) s and m below an echo sounder that was recorded with them.
+    gains: of each beam, as its head counts them; empty where they are not known.
     """
 
     beams: List[Beam]
@@ -29,6 +30,7 @@ class RecordedBeams:
     refused: int = 0
     notes: List[str] = field(default_factory=list)
     soundings: np.ndarray = field(default_factory=lambda: np.empty((0, 2)))
+    gains: List[int] = field(default_factory=list)
 
     @property
     def stamps_ns(self) -> np.ndarray:

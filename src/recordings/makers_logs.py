@@ -117,7 +117,7 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
     except NoLogError as error:
         raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
     stream = MessageStream()
-    heads: Dict[int, List[Beam]] = {}
+    heads: Dict[int, List[Tuple[Beam, int]]] = {}
     soundings: List[Tuple[float, float]] = []
     inconsistent = 0
     for time, message in _messages(log, stream):
@@ -130,20 +130,21 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
         except (MessageError, RefusedInput):
             inconsistent += 1
             continue
-        heads.setdefault(message.src_device_id, []).append(beam)
+        heads.setdefault(message.src_device_id, []).append((beam, found.pulse.gain_setting))
     refused = log.damaged + stream.broken + inconsistent
     if not heads:
         raise RecordingError(f"{path}: none of its messages is a beam of a Ping360; {refused} were damaged or empty")
     notes = [
         f"times of {path.name} count from the start of Ping Viewer; ranges are those of {USUAL_SPEED_OF_SOUND:g} m/s"
     ]
-    device, beams = max(heads.items(), key=lambda one: len(one[1]))
+    device, heard = max(heads.items(), key=lambda one: len(one[1]))
+    beams, gains = map(list, zip(*heard))
     if len(heads) > 1:
         counts = ", ".join(f"{len(kept)} of device {number}" for number, kept in sorted(heads.items()))
         notes.append(f"{path.name} holds the beams of several heads, {counts}: only those of device {device} are used")
     if soundings:
         notes.append(f"an echo sounder beside the Ping360 told {len(soundings)} distances below")
-    return RecordedBeams(beams, [False] * len(beams), refused, notes, np.array(soundings).reshape(-1, 2))
+    return RecordedBeams(beams, [False] * len(beams), refused, notes, np.array(soundings).reshape(-1, 2), gains)
 
 
 def _ping_viewer_next_beams(path: Path) -> RecordedBeams:

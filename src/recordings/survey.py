@@ -5,9 +5,10 @@ import shlex
 from dataclasses import dataclass
 from itertools import groupby, islice
 from pathlib import Path
-from typing import Any, Dict, List, Optional
+from typing import Any, Dict, List, Optional, Sequence
 
 import numpy as np
+from scipy.ndimage import median_filter
 
 from node_support.geometry import FULL_TURN, wrapped
 from recordings.bags.bag import Bag, Topic
@@ -176,8 +177,9 @@ def _command(survey: Survey, request: Request) -> str:
 
 
 _GAP = 1.0  # s: longer than any head takes for a beam
+_STEPS_AROUND = 5
 _WHOLE = 0.9  # share of a circle from which on a sweep counts as a turn: beams may be lost
-_MOST_SETTINGS = 6  # that are listed
+_MOST_SETTINGS = 6  # of one kind that are listed
 
 
 def beam_lines(recorded: RecordedBeams) -> List[str]:
@@ -188,37 +190,48 @@ def beam_lines(recorded: RecordedBeams) -> List[str]:
     shifts = sweep_shifts(beams)
     return [
         f"{len(beams)} beams in {(end - start) * 1e-9:.1f} s{lost}",
-        _head(beams),
-        _settings(beams),
+        *_head(beams),
+        *_settings(beams, recorded),
         _gaps(np.array([beam.stamp_ns for beam in beams])),
         f"motion as sweeps show it: {shifts.motion.value}; {shifts}",
     ]
 
 
-def _head(beams: List[Beam]) -> str:
-    angles = np.array([beam.angle for beam in beams])
-    steps = wrapped(np.diff(angles))
-    steps = np.abs(steps[steps != 0.0])
-    if not steps.size:
-        return "the head stood still"
+def _head(beams: List[Beam]) -> List[str]:
     turns = turns_of([PlacedBeam(beam, np.eye(4), is_moving=False) for beam in beams], fewest=2)
-    swept = np.array([np.abs(wrapped(np.diff([one.beam.angle for one in turn]))).sum() for turn in turns])
+    angles = [np.array([one.beam.angle for one in turn]) for turn in turns]
+    moved = [np.abs(wrapped(np.diff(one))) for one in angles]
+    if not any(one.any() for one in moved):
+        return ["the head stood still"]
+    swept = np.array([one.sum() for one in moved])
     is_turn = swept >= _WHOLE * FULL_TURN
     told = [f"{is_turn.sum()} whole turns"] if is_turn.any() else []
     if not is_turn.all():
         told.append(f"{(~is_turn).sum()} sweeps of {np.degrees(np.median(swept[~is_turn])):.0f} degrees")
-    return f"the head made {' and '.join(told)} in steps of {np.degrees(np.median(steps)):.2g} degrees"
+    return [f"the head made {' and '.join(told)}"]
 
 
-def _settings(beams: List[Beam]) -> str:
-    """Return in words which ranges there were from when on."""
-    start = beams[0].stamp_ns
-    sizes = ((beam.intensities.size, beam.range_resolution, beam.stamp_ns) for beam in beams)
-    alike = groupby(sizes, key=lambda one: (one[0], round(one[0] * one[1], 1)))
-    found = [(reach, bins, (next(run)[2] - start) * 1e-9) for (bins, reach), run in alike]
-    listed = [f"{reach:g} m in {bins} bins from {since:.1f} s" for reach, bins, since in found[:_MOST_SETTINGS]]
+def _settings(beams: List[Beam], recorded: RecordedBeams) -> List[str]:
+    """Return in words which ranges, steps and gains there were from when on."""
+    stamps = [beam.stamp_ns for beam in beams]
+    ranges = [f"{round(len(beam.ranges) * beam.range_resolution, 1):g} m in {len(beam.ranges)} bins" for beam in beams]
+    steps = np.degrees(np.abs(wrapped(np.diff([beam.angle for beam in beams]))))
+    # Where the head turns back, or a beam was lost, one step is another.
+    steps = median_filter(steps, _STEPS_AROUND, mode="nearest")
+    found = [_since("range", ranges, stamps)]
+    if steps.any():
+        found.append(_since("step", [f"{step:.2g} degrees" for step in steps], stamps))
+    if recorded.gains:
+        found.append(_since("gain", [str(gain) for gain in recorded.gains], list(recorded.stamps_ns)))
+    return found
+
+
+def _since(name: str, told: Sequence[str], stamps_ns: Sequence[int]) -> str:
+    """Return what a setting was, as `told` at each stamp, and from when on."""
+    alike = groupby(zip(told, stamps_ns), key=lambda one: one[0])
+    found = [f"{one} from {(next(run)[1] - stamps_ns[0]) * 1e-9:.1f} s" for one, run in alike]
     more = f", and {len(found) - _MOST_SETTINGS} changes more" if len(found) > _MOST_SETTINGS else ""
-    return f"range: {', '.join(listed)}{more}"
+    return f"{name}: {', '.join(found[:_MOST_SETTINGS])}{more}"
 
 
 def _gaps(stamps_ns: np.ndarray) -> str:

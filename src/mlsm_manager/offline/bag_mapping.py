@@ -117,7 +117,7 @@ def _followed(
 
     Where scans do not go on by a compass alone, a vehicle that strafes is tried too, unless the odometry is named.
     """
-    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion)
+    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
     replayed = _replayed(recording, scans, parameters)
     if _is_named(options) or odometry.kind is not OdometryKind.HEADING or not may_strafe(replayed.solver):
         return odometry, parameters, replayed

@@ -144,8 +144,13 @@ def whole_turns(
         scans.append(scan)
         on_beams(number)
     if not scans:
-        raise RecordingError(f"{bag}: {beams} beams make no turn, sweep or part of one of which echoes can be told")
+        raise _no_turn(bag, beams)
     return scans
+
+
+def _no_turn(path: Path, beams: int) -> RecordingError:
+    what = "1 beam makes" if beams == 1 else f"{beams} beams make"
+    return RecordingError(f"{path}: {what} no turn, sweep or part of one of which echoes can be told")
 
 
 def track_between(track: Track, start: float, end: float) -> Track:
@@ -163,6 +168,8 @@ def read_recording(path: Path, request: Request) -> Recording:
     if not stamps.size:
         # A vehicle that never moves may have fixed transforms only.
         stamps = np.unique(recorded.stamps_ns)
+        if len(stamps) < 2:
+            raise _no_turn(path, len(recorded.beams))
     track = _track(tree, stamps, np.sort(recorded.stamps_ns), path, request)
     placed, unplaced = _placed(recorded, tree, path, request)
     known = content.truth

@@ -25,27 +25,33 @@ _WORTH_TRYING = 0.75
 strafing ones 0.57 and 0.66."""
 
 
-# A pose that is known to stay; and one that drifts as a head on a cable or a moored vehicle: 0.05 m/s for a minute.
+# A pose that is known to stay; one that seems to, by echoes that do not tell all directions as well: 5 mm/s, which they
+# hold back where they tell; and one that drifts as a head on a cable or a moored vehicle: 0.05 m/s for a minute.
 _STILL = {
     "scale_deviation": 0.0, "direction_deviation": 0.0, "speed_deviation": 1e-4, "heading_deviation": 1e-3,
 }  # fmt: skip
+_SEEMS_STILL = {**_STILL, "speed_deviation": 0.005, "rate_correlation_time": 60.0}
 _DRIFTING = {
     **_STILL, "speed_deviation": 0.05, "rate_correlation_time": 60.0, "heading_deviation": 0.0,
     "turn_rate_deviation": 0.003,
 }  # fmt: skip
 _WITHOUT_MOTION: Dict[Optional[SweepMotion], Dict[str, float]] = {
-    SweepMotion.STILL: _STILL,
+    SweepMotion.STILL: _SEEMS_STILL,
     SweepMotion.UNTOLD: _STILL,
     SweepMotion.DRIFTING: _DRIFTING,
 }
 
 
 class OdometryFound(NamedTuple):
-    """kind: of the odometry. reason: one line that says why. motion: what sweeps tell where nothing was recorded."""
+    """kind: of the odometry. reason: one line that says why. motion: what sweeps tell where nothing was recorded.
+
+    is_said: somebody says that the vehicle stood still.
+    """
 
     kind: OdometryKind
     reason: str
     motion: Optional[SweepMotion] = None
+    is_said: bool = False
 
     @property
     def name(self) -> str:
@@ -80,19 +86,20 @@ def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:
 def _without_motion(shifts: SweepShifts, standing: bool) -> OdometryFound:
     if standing:
         doubt = f", but it seems to be {shifts.motion.value}: {shifts}" if shifts.motion.is_motion else ""
-        return OdometryFound(OdometryKind.DVL, f"--standing says so{doubt}", SweepMotion.STILL)
+        return OdometryFound(OdometryKind.DVL, f"--standing says so{doubt}", SweepMotion.STILL, is_said=True)
     kind = OdometryKind.NONE if shifts.motion is SweepMotion.MOVING else OdometryKind.DVL
     return OdometryFound(kind, f"no position or heading changes, and {shifts}", shifts.motion)
 
 
 def with_odometry(
-    parameters: ReplayParameters, kind: OdometryKind, fixed: Collection[str], motion: Optional[SweepMotion] = None
-) -> ReplayParameters:
+    parameters: ReplayParameters, kind: OdometryKind, fixed: Collection[str], motion: Optional[SweepMotion] = None,
+    is_said: bool = False,
+) -> ReplayParameters:  # fmt: skip
     """Return `parameters` with the profile of an odometry, but for those that are `fixed`.
 
-    motion: what sweeps tell where the odometry tells none.
+    motion: what sweeps tell where the odometry tells none. is_said: somebody says that the vehicle stood still.
     """
-    values = {**profile_values(kind), **_WITHOUT_MOTION.get(motion, {})}
+    values = {**profile_values(kind), **(_STILL if is_said else _WITHOUT_MOTION.get(motion, {}))}
     return parameters.changed({key: value for key, value in values.items() if key not in fixed})
 
 

@@ -126,9 +126,11 @@ def _apart(sweeps: List[List[Beam]], lag: int) -> Optional[_Apart]:
 
 def _found(before: List[Beam], sweep: List[Beam]) -> List[Tuple[float, float]]:
     """Return for each sector with echoes its direction, rad, and the speed by which it is found elsewhere in the other
-    sweep, m/s; 0 where it was.
+    sweep, m/s; 0 where it was. Of beams that end where the head itself rings there is none.
     """
     one, other, step, length = _images(before, sweep)
+    if not one.shape[1]:
+        return []
     seconds = 1e-9 * (np.mean([beam.stamp_ns for beam in sweep]) - np.mean([beam.stamp_ns for beam in before]))
     found = []
     for rows in _sectors(np.isfinite(one[:, 0]) & np.isfinite(other[:, 0]), step):

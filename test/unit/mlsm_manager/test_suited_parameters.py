@@ -44,11 +44,17 @@ def test_a_pose_that_never_changes_is_held_unless_sweeps_show_a_motion():
     standing = odometry_of(Recording([], 0, track(x=3.0, y=1.0, yaw=0.4), None))
     assert (standing.name, standing.motion) == ("not told, held still", SweepMotion.UNTOLD)
     assert "nothing tells" in standing.assumed
-    held, drifting = (
+    held, seems_still, drifting = (
         with_odometry(ReplayParameters(), standing.kind, (), motion)
-        for motion in (SweepMotion.UNTOLD, SweepMotion.DRIFTING)
+        for motion in (SweepMotion.UNTOLD, SweepMotion.STILL, SweepMotion.DRIFTING)
     )
-    assert held.speed_deviation < 1e-3 < drifting.speed_deviation
+    assert held.speed_deviation < 1e-3 < seems_still.speed_deviation < drifting.speed_deviation
+
+
+def test_a_vehicle_of_which_somebody_says_that_it_stood_is_held_even_where_echoes_tell_it_too():
+    said = odometry_of(Recording([], 0, track(x=3.0, y=1.0, yaw=0.4), None), standing=True)
+    held = with_odometry(ReplayParameters(), said.kind, (), said.motion, said.is_said)
+    assert held.speed_deviation < 1e-3
 
 
 @pytest.mark.parametrize("kind", list(OdometryKind))

@@ -57,6 +57,11 @@ def test_one_turn_or_noise_tells_no_motion():
     assert sweep_shifts(heard).motion is SweepMotion.UNTOLD
 
 
+def test_beams_shorter_than_the_head_rings_tell_no_motion():
+    heard = [Beam(index + 1, "sonar", index * STEP, np.ones(10, np.uint8), RESOLUTION) for index in range(3 * TURN)]
+    assert sweep_shifts(heard).motion is SweepMotion.UNTOLD
+
+
 def test_few_sweeps_or_one_direction_are_not_called_still_or_moved():
     to_and_fro = [*range(-13, 14), *range(13, -14, -1)]
     assert sweep_shifts(beams(lambda _: (0.0, 0.0), 8 * to_and_fro)).motion is SweepMotion.UNTOLD
@@ -72,9 +77,13 @@ def test_a_sector_that_crosses_angle_zero_tells_as_any_other():
 def test_head_settings_gaps_and_motion_are_told():
     made = beams(lambda _: (0.0, 0.0), 4 * [*range(50), *range(49, -1, -1)])
     late = [Beam(one.stamp_ns + 10**11, "sonar", one.angle, one.intensities, 0.1) for one in made[:10]]
-    told = beam_lines(RecordedBeams(made + late, [], refused=3))
-    assert told[0] == "410 beams in 100.9 s; 3 messages were damaged or held none"
-    assert told[1] == "the head made 8 sweeps of 86 degrees in steps of 1.8 degrees"
+    gains = [0] * 200 + [2] * 210
+    told = beam_lines(RecordedBeams(made + late, [], refused=3, gains=gains))
+    assert told[:2] == [
+        "410 beams in 100.9 s; 3 messages were damaged or held none",
+        "the head made 8 sweeps of 86 degrees",
+    ]
     assert told[2] == "range: 15 m in 300 bins from 0.0 s, 30 m in 300 bins from 100.0 s"
-    assert told[3] == "1 gaps longer than 1 s, the longest 60.1 s after 39.9 s"
-    assert told[4].startswith("motion as sweeps show it: still; ")
+    assert told[3:5] == ["step: 1.8 degrees from 0.0 s", "gain: 0 from 0.0 s, 2 from 20.0 s"]
+    assert told[5] == "1 gaps longer than 1 s, the longest 60.1 s after 39.9 s"
+    assert told[6].startswith("motion as sweeps show it: still; ")
