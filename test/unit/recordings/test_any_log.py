@@ -9,7 +9,7 @@ from test_sweep_shifts import distance
 
 from mlsm_manager.offline.map_bag import map_bag, map_bag_arguments
 from mlsm_manager.surface_map.map_file import read_map
-from ping360_driver.protocol.messages import MessageId, packed
+from ping360_driver.messages import MessageId, packed
 
 TICK, HALF_SOUND = 25e-9, 750.0  # s, m/s
 SAMPLES = 400
