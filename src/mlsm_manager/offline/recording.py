@@ -149,8 +149,7 @@ def whole_turns(
 
 
 def _no_turn(path: Path, beams: int) -> RecordingError:
-    what = "1 beam makes" if beams == 1 else f"{beams} beams make"
-    return RecordingError(f"{path}: {what} no turn, sweep or part of one of which echoes can be told")
+    return RecordingError(f"{path}: no turn, sweep or part of one of which echoes can be told, in {beams} beam(s)")
 
 
 def track_between(track: Track, start: float, end: float) -> Track:

@@ -11,7 +11,7 @@ from enum import Enum
 from typing import Optional, Tuple
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d, uniform_filter1d
+from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
@@ -32,6 +32,8 @@ _SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do
 _SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included
 _ROWS_MEASURED = 8  # Rows of a cloud that tell the length of a bin; it is the same in all of them
 _ROUNDING = 1e-3  # Bins: the length of a bin is known from float32 points, which move by this with the mount
+_NARROW = np.pi / 2.0  # rad: in a narrower sector a wall ahead is heard at one range in most directions, as a ring is
+_PROFILE = 4.0  # m along range: what is longer than that is no wall
 _EDGE_SIGMA = 0.15  # m: of the filter for plateaus, which closes gaps and leaves an edge where it is
 
 
@@ -59,7 +61,7 @@ class EchoExtractorParameters(ParameterSet):
     )  # fmt: skip
     ring_quantile: float = parameter(
         0.4, "quantile over the directions that makes the ring of floor echoes: 0.3 among walls, 0.5 in open water; "
-        "0: no ring, for sectors",
+        "0: no ring",
         low=0.0, high=0.9,
     )  # fmt: skip
     min_contrast: float = parameter(
@@ -91,19 +93,23 @@ class EchoExtractorParameters(ParameterSet):
 
 
 def extract_echoes(
-    strengths: np.ndarray, range_resolution: float, parameters: EchoExtractorParameters
+    strengths: np.ndarray, range_resolution: float, parameters: EchoExtractorParameters, is_narrow: bool = False
 ) -> Tuple[Peaks, float]:
     """Return the echoes of a polar scan, and the height that separated them from speckle.
 
     strengths: (beams, bins), any numeric type, the beams of one turn in any order; range_resolution: length of a bin,
-    m. parameters: settled ones. A height is the strength by which an echo stands out of the ring. Raises RefusedInput
-    for a scan of too few beams to tell a ring from echoes.
+    m. parameters: settled ones. is_narrow: of a sector in which no ring can be told from a wall ahead; then the ring is
+    only what is heard along several metres. A height is the strength by which an echo stands out of the ring. Raises
+    RefusedInput for a scan of too few beams to tell a ring from echoes.
     """
     is_dense = parameters.mode is ExtractionMode.DENSE
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
     first_bin = max(_bins_above(parameters.min_range / range_resolution - 0.5), 0)
     smooth = matched_filter(strengths, sigma, first_bin)
     ring, spread = ring_of(smooth, parameters.ring_quantile, sigma)
+    if is_narrow:
+        around = 2 * (_bins_above(_PROFILE / range_resolution) // 2) + 1
+        ring, spread = (np.minimum(one, median_filter(one, around, mode="nearest")) for one in (ring, spread))
     response = np.maximum(smooth - ring, 0.0, out=smooth)
     peaks = find_peaks(response, apart=_bins_above(2.0 * sigma))
     least = np.maximum(parameters.min_contrast * spread, parameters.min_height)
@@ -193,7 +199,8 @@ class EchoExtractor:
         resolution = bin_length(rows)
         if not self.parameters.is_settled:
             self.newest_parameters = self.parameters.settled(self._heard_with(strengths, resolution, cloud.stamp_ns))
-        echoes, self.newest_threshold = extract_echoes(strengths, resolution, self.newest_parameters)
+        is_narrow = width_of(rows) < _NARROW
+        echoes, self.newest_threshold = extract_echoes(strengths, resolution, self.newest_parameters, is_narrow)
         points = places(rows, echoes.beams, echoes.bins)
         points[:, 3] = echoes.heights
         stamps = cloud.time_stamps.reshape(cloud.height, -1)[echoes.beams, 0]
@@ -225,6 +232,16 @@ def bin_length(rows: np.ndarray) -> float:
     if lengths.size == 0:
         raise RefusedInput("clouds refused", "no two neighbouring bins are left; check min_range and height_limit")
     return float(np.median(lengths))
+
+
+def width_of(rows: np.ndarray) -> float:
+    """Return by how much the head turned in an organised cloud (beams, bins, 4), rad; infinite where it is unknown."""
+    ahead = rows[:, -1, :3] - rows[:, rows.shape[1] // 2, :3]
+    lengths = np.linalg.norm(ahead, axis=1)
+    if not (np.isfinite(lengths).all() and lengths.all()):
+        return np.inf
+    ahead = ahead / lengths[:, np.newaxis]
+    return float(np.arccos(np.clip((ahead[1:] * ahead[:-1]).sum(axis=1), -1.0, 1.0)).sum())
 
 
 def places(rows: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:

@@ -57,6 +57,14 @@ SETTLED_MODES = [mode for mode in ExtractionMode if mode is not ExtractionMode.A
 STRONG_ONLY = {"threshold_share": 1.0, "min_height": 10.0}
 
 
+def test_a_wall_ahead_in_a_narrow_sector_is_no_ring():
+    """It is heard at about one range in all directions, which in a whole turn is an echo of the floor."""
+    ahead = wall_image(np.full(20, 150.0))
+    found, _ = extract_echoes(ahead, RESOLUTION, EchoExtractorParameters(**PEAKS), is_narrow=True)
+    assert len(found.bins) == 20
+    assert len(extract_echoes(ahead, RESOLUTION, EchoExtractorParameters(**PEAKS))[0].bins) == 0
+
+
 def _echoes(image, **values):
     return extract_echoes(image, RESOLUTION, EchoExtractorParameters(**{**PEAKS, **values}))[0]
 
