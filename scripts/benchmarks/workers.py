@@ -5,7 +5,6 @@ Each row says how long that took, over the time of one worker, and whether all f
 
 import os
 import re
-import signal
 import subprocess
 import sys
 import tempfile
@@ -19,7 +18,6 @@ from benchmarks.harness import benchmark_parser
 from mlsm_manager.offline.each import INDEX, map_each, recordings_in
 
 _AT_ONCE = (1, 2, 4)
-_LOST_AFTER = 5.0  # s
 # What tells how long it took.
 _SECONDS = re.compile(rb'"(seconds|times_real_time)": [0-9.e-]+')
 _UNLIKE = ("messages.txt", INDEX, "report.html")
@@ -55,6 +53,17 @@ def _bytes_of(folder: Path) -> Dict[str, bytes]:
     return {str(one.relative_to(folder)): _SECONDS.sub(b"", one.read_bytes()) for one in files}
 
 
+def _folder(scratch: Path, name: str) -> Path:
+    return scratch / name.replace(" ", "_")
+
+
+def _kill_at_work(worker: "subprocess.Popen[bytes]", out: Path) -> None:
+    """Kill one of two workers when both have begun a recording, each in a folder of its own."""
+    while worker.poll() is None and sum(one.is_dir() for one in out.glob("*")) < 2:
+        time.sleep(0.1)
+    worker.kill()
+
+
 def print_rows(recordings: List[Path], scratch: Path) -> None:
     """Map all recordings in each way, and print a row for each."""
     first: Dict[str, bytes] = {}
@@ -62,7 +71,7 @@ def print_rows(recordings: List[Path], scratch: Path) -> None:
 
     def row(name: str, run: Callable[[Path], object]) -> None:
         nonlocal reference
-        out, start = scratch / name.replace(" ", "_"), time.monotonic()
+        out, start = _folder(scratch, name), time.monotonic()
         run(out)
         seconds, found = time.monotonic() - start, _bytes_of(out)
         reference = reference or seconds
@@ -79,8 +88,9 @@ def print_rows(recordings: List[Path], scratch: Path) -> None:
     with _cluster(2):
         row("scheduler with 2", lambda out: map_each(recordings, out, [], "tcp://127.0.0.1:8797"))
     with _cluster(2) as programs:
-        threading.Timer(_LOST_AFTER, programs[-1].send_signal, [signal.SIGKILL]).start()
-        row("scheduler with 2, 1 killed", lambda out: map_each(recordings, out, [], "tcp://127.0.0.1:8797"))
+        name = "scheduler with 2, 1 killed"
+        threading.Thread(target=_kill_at_work, args=(programs[-1], _folder(scratch, name)), daemon=True).start()
+        row(name, lambda out: map_each(recordings, out, [], "tcp://127.0.0.1:8797"))
 
 
 def main() -> None:
