@@ -1,6 +1,5 @@
 """README.md and the pages of docs/ build to a site, which a browser shows from files."""
 
-import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -9,7 +8,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
-BROWSER = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--window-size=390,844")
+BROWSER = ("--disable-gpu", "--window-size=390,844")
 
 
 @pytest.fixture(scope="module")
@@ -22,23 +21,6 @@ def site(tmp_path_factory):
     command = [sys.executable, "-m", "sphinx", *options, ".", str(folder)]
     done = subprocess.run(command, cwd=str(ROOT), stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     return folder, (done.returncode, done.stdout)
-
-
-@pytest.fixture
-def browser():
-    webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-    from selenium.webdriver.chrome.service import Service
-
-    driver = shutil.which("chromedriver")
-    if driver is None or shutil.which("chromium") is None:
-        pytest.skip("chromium and chromedriver are not installed")
-    options = webdriver.ChromeOptions()
-    for option in BROWSER:
-        options.add_argument(option)
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    opened = webdriver.Chrome(service=Service(driver), options=options)
-    yield opened
-    opened.quit()
 
 
 def test_the_pages_build_to_a_site_without_a_warning(site):

@@ -1,7 +1,6 @@
 """The page in a real browser, with a real master and mlsm_core: it draws, follows, marks, and comes back by itself."""
 
 import json
-import shutil
 import subprocess
 import sys
 import time
@@ -15,11 +14,7 @@ from test_master_restart import Master
 from georeferencing.origin import Origin
 from mlsm_manager.surface_map.map_file import read_map
 
-webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
-from selenium.webdriver.chrome.options import Options  # noqa: E402
-from selenium.webdriver.chrome.service import Service  # noqa: E402
-
-OPTIONS = ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu", "--window-size=1000,700")
+BROWSER = ("--disable-gpu", "--window-size=1000,700")
 # The darkest blue (0 to 255) that is drawn within a metre of a point of the map.
 DARKEST = """
 window.darkest = (point) => {
@@ -78,21 +73,6 @@ class Site:
         events = [json.loads(entry["message"])["message"] for entry in self.browser.get_log("performance")]
         urls = [one["params"]["request"]["url"] for one in events if one["method"] == "Network.requestWillBeSent"]
         return {url.split("/")[2] for url in urls if not url.startswith("data:")}
-
-
-@pytest.fixture(scope="module")
-def browser():
-    program, driver = (shutil.which(name) for name in ("chromium", "chromedriver"))
-    if program is None or driver is None:
-        pytest.skip("chromium and chromedriver are not installed")
-    options = Options()
-    for option in OPTIONS:
-        options.add_argument(option)
-    options.binary_location = program
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL", "performance": "ALL"})
-    opened = webdriver.Chrome(service=Service(driver), options=options)
-    yield opened
-    opened.quit()
 
 
 @pytest.fixture(scope="module")

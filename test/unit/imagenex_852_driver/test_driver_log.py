@@ -105,8 +105,8 @@ def read_back(path, data):
     return list(reader), reader
 
 
-def test_every_ping_of_the_real_log_is_read(hydroball):
-    reader = LogReader(hydroball)
+def test_every_ping_of_the_real_log_is_read(recording):
+    reader = LogReader(recording("hydroball.852"))
     seen = {
         (ping.reply.max_range, len(ping.reply.echoes), ping.start_gain_db, ping.reply.head_id, ping.stamp)
         for ping in reader

@@ -3,8 +3,9 @@
 from made_harbour import SONAR_IN_BASE
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.motion_models import Compass, DvlFactors, DvlOdometry, ThrusterFactors, ThrusterOdometry
+from mlsm_manager.joint_solver.motion_models import Compass
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.position_models import DvlFactors, DvlOdometry, ThrusterFactors, ThrusterOdometry
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.velocity_models import (

@@ -9,9 +9,10 @@ from made_models import DVL_ODOMETRY, followed, solver_parameters
 
 from mlsm_manager.joint_solver.batch_solver import solved
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.motion_models import DIRECTION, DvlFactors
+from mlsm_manager.joint_solver.motion_models import DIRECTION
 from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
+from mlsm_manager.joint_solver.position_models import DvlFactors
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import solved_path
 from node_support.errors import RefusedInput

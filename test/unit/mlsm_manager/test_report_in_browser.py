@@ -1,43 +1,21 @@
 """report.html in a real browser, without a network: one page, of a long mission with a large map."""
 
-import shutil
-
 import pytest
 from made_missions import mission
 
-webdriver = pytest.importorskip("selenium.webdriver", reason="selenium is not installed")
+pytest.importorskip("selenium", reason="selenium is not installed")
 page = pytest.importorskip("mlsm_manager.report.page", reason="plotly is not installed")
-from selenium.webdriver.chrome.options import Options  # noqa: E402
-from selenium.webdriver.chrome.service import Service  # noqa: E402
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
 pytestmark = [pytest.mark.long, pytest.mark.newest_only("about the browser; pages are written with every version")]
 
-OPTIONS = (
-    "--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--enable-unsafe-swiftshader",
-    "--window-size=400,400", "--host-resolver-rules=MAP * ~NOTFOUND",
-)  # fmt: skip
+BROWSER = ("--enable-unsafe-swiftshader", "--window-size=400,400", "--host-resolver-rules=MAP * ~NOTFOUND")
 BLOCKS, SCANS = 300_000, 200
 SHOWN = """
 const traces = document.getElementById('above').data.slice(-2);
 return traces.map(trace => [trace.x[0], trace.y[0], trace.x.length]);
 """
-
-
-@pytest.fixture(scope="module")
-def browser():
-    program, driver = (shutil.which(name) for name in ("chromium", "chromedriver"))
-    if program is None or driver is None:
-        pytest.skip("chromium and chromedriver are not installed")
-    options = Options()
-    for option in OPTIONS:
-        options.add_argument(option)
-    options.binary_location = program
-    options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
-    opened = webdriver.Chrome(service=Service(driver), options=options)
-    yield opened
-    opened.quit()
 
 
 @pytest.fixture(scope="module")

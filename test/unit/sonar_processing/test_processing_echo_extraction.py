@@ -16,8 +16,8 @@ from sonar_processing.filters.echo_extractor import (
     EchoExtractorParameters,
     ExtractionMode,
     extract_echoes,
-    height_threshold,
 )
+from sonar_processing.filters.threshold import height_threshold
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
