@@ -231,11 +231,6 @@ def product(first: np.ndarray, second: np.ndarray) -> np.ndarray:
     return real + 1j * (first.real * second.imag + first.imag * second.real)
 
 
-def turned(angle: np.ndarray) -> np.ndarray:
-    """Return the complex numbers that turn by `angle` (...) [rad]."""
-    return np.exp(1j * angle)
-
-
 def stretched(path: np.ndarray, gain: np.ndarray, angle: np.ndarray) -> np.ndarray:
     """Return complex steps `path` (...) times `gain` (...), turned by `angle` (...) [rad]."""
-    return product(product(gain, turned(angle)), path)
+    return product(product(gain, np.exp(1j * angle)), path)

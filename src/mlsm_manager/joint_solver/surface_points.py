@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry import inverse, rotated, transformed, wrapped
-from sonar_processing.filters.echo_extractor import height_threshold
+from sonar_processing.filters.threshold import height_threshold
 
 _NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
 LEAST_REACH = 2.3  # m: neighbours at short range, and of points that no beam is known of

@@ -18,7 +18,7 @@ from mlsm_manager.joint_solver.motion_models import (
     walk,
 )
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
-from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched, turned
+from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
 from mlsm_manager.scan_matching.prediction import Fading
 from node_support.geometry import harmonics
 
@@ -165,7 +165,7 @@ class HeadingFactors(OdometryModel):
     def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         speeds = self.gain(nodes)
-        ahead = product(turned(yaw), np.diff(self.reference(motion)))
+        ahead = product(np.exp(1j * yaw), np.diff(self.reference(motion)))
         step = product((speeds[:-1] + speeds[1:]) / 2.0, ahead)
         residual = np.diff(as_complex(nodes)) + np.diff(motion.positions) - step
         weight = 1.0 / (self._step_variance(motion.durations) + _ROUNDING_VARIANCE)

@@ -8,16 +8,16 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, solved
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.motion_models import (
-    Compass,
+from mlsm_manager.joint_solver.motion_models import Compass, OdometryModel
+from mlsm_manager.joint_solver.parameters import NodeSearch
+from mlsm_manager.joint_solver.position_models import (
     DvlFactors,
     DvlOdometry,
-    OdometryModel,
+    OdometryDoubt,
     ThrusterFactors,
     ThrusterOdometry,
+    UnsureFactors,
 )
-from mlsm_manager.joint_solver.parameters import NodeSearch
-from mlsm_manager.joint_solver.unsure_odometry import OdometryDoubt, UnsureFactors
 from mlsm_manager.joint_solver.velocity_models import (
     HeadingFactors,
     HeadingOdometry,

@@ -15,7 +15,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
+from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_peaks import (
     EchoShape,
     EchoStatistics,
@@ -24,7 +24,7 @@ from sonar_processing.filters.echo_peaks import (
     leading_edges,
     points_along_runs,
 )
-from sonar_processing.filters.threshold import otsu_threshold
+from sonar_processing.filters.threshold import height_threshold
 
 FEWEST_BEAMS = 6  # Fewer directions tell no quantile over them
 _SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it is sampled
@@ -155,19 +155,6 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
 def _bins_above(width: float) -> int:
     """Return the least number of bins above a width [bins], also above a whole number from which rounding takes."""
     return math.floor(width + _ROUNDING) + 1
-
-
-def height_threshold(heights: np.ndarray) -> float:
-    """Return Otsu's threshold for the `heights` (n,) of peaks, 0 without peaks.
-
-    Never above half of the highest: in a scan without speckle, as of a sonar that sends two strengths only, Otsu would
-    part echoes from echoes.
-    """
-    if heights.size == 0:
-        return 0.0
-    highest = float(heights.max())
-    scaled = otsu_threshold(heights * (HIGHEST_STRENGTH / highest)) * highest / HIGHEST_STRENGTH
-    return min(scaled, highest / 2.0)
 
 
 class EchoExtractor:

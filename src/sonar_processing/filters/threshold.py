@@ -109,3 +109,16 @@ def otsu_threshold(strengths: np.ndarray) -> float:
 
     levels = np.clip(strengths, 0, HIGHEST_STRENGTH).astype(np.int64)
     return threshold_of_levels(np.bincount(levels, minlength=HIGHEST_STRENGTH + 1))
+
+
+def height_threshold(heights: np.ndarray) -> float:
+    """Return Otsu's threshold for the `heights` (n,) of peaks, 0 without peaks.
+
+    Never above half of the highest: in a scan without speckle, as of a sonar that sends two strengths only, Otsu would
+    part echoes from echoes.
+    """
+    if heights.size == 0:
+        return 0.0
+    highest = float(heights.max())
+    scaled = otsu_threshold(heights * (HIGHEST_STRENGTH / highest)) * highest / HIGHEST_STRENGTH
+    return min(scaled, highest / 2.0)

@@ -1,0 +1,271 @@
+"""Motion models of odometries that report positions: of a DVL, of the thrusters' commands, or of either."""
+
+from dataclasses import dataclass, fields, replace
+from typing import Dict, NamedTuple, Optional
+
+import numpy as np
+
+from mlsm_manager.joint_solver.motion_models import (
+    CURRENT_X,
+    CURRENT_Y,
+    DIRECTION,
+    DRIFT_STATES,
+    FIXED_DEVIATION,
+    HELD_DEVIATION,
+    SCALE,
+    Changes,
+    Compass,
+    Drift,
+    OdometryModel,
+    add_changes,
+    walk,
+)
+from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
+from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
+from mlsm_manager.joint_solver.prior_mixture import PriorComponent, PriorMixture
+
+_CURRENT = slice(5, 7)
+# Of an odometry with which something is wrong, relative and 1/sqrt(s): distances are known as a DVL's at first and may
+# be wrong by half two minutes later.
+_FREED_SCALE, _FREED_SCALE_WALK = 0.09, 0.025
+_HELD_SPEED = 0.3  # m/s: the usual one of a small vehicle
+_ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not divide by zero
+
+
+@dataclass(frozen=True)
+class DvlOdometry:
+    """How wrong an odometry of DVL and compass may be.
+
+    position_walk: m/sqrt(s), integrated noise of its velocities. direction: rad from reported to true motion, as known
+    beforehand, direction_walk: rad/sqrt(s). scale: true over reported distance minus 1, as known beforehand.
+    """
+
+    compass: Compass
+    position_walk: float
+    direction: float
+    direction_deviation: float
+    direction_walk: float
+    scale: float
+    scale_deviation: float
+
+
+@dataclass(frozen=True)
+class ThrusterOdometry(DvlOdometry):
+    """How wrong a motion may be that was reckoned from the commands of the thrusters.
+
+    The speed that a command means changes with the battery and with what hangs on the vehicle; a current carries it
+    along. scale_walk: 1/sqrt(s). current_deviation: m/s in each direction. current_walk: m/s/sqrt(s).
+    """
+
+    scale_walk: float
+    current_deviation: float
+    current_walk: float
+
+
+class DvlFactors(OdometryModel):
+    """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly."""
+
+    width = 5
+
+    def __init__(self, parameters: DvlOdometry) -> None:
+        self._parameters = parameters
+
+    @property
+    def compass(self) -> Optional[Compass]:
+        return self._parameters.compass
+
+    @property
+    def freed(self) -> "ThrusterFactors":
+        own = {field.name: getattr(self._parameters, field.name) for field in fields(DvlOdometry)}
+        still = {"scale_walk": 0.0, "current_deviation": HELD_DEVIATION, "current_walk": 0.0}
+        return ThrusterFactors(ThrusterOdometry(**own, **still)).freed
+
+    @property
+    def calibrated(self) -> Dict[str, int]:
+        return {"odometry_scale": SCALE, "odometry_direction": DIRECTION}
+
+    @property
+    def distance_deviation(self) -> float:
+        return self._parameters.scale_deviation
+
+    @property
+    def position_walk(self) -> float:
+        return self._parameters.position_walk
+
+    def first_node(self) -> np.ndarray:
+        return np.array([0.0, 0.0, 0.0, self._parameters.direction, self._parameters.scale])
+
+    def first_deviations(self) -> np.ndarray:
+        own, fixed = self._parameters, FIXED_DEVIATION * 10.0
+        walking = np.maximum([own.direction_deviation, own.scale_deviation], HELD_DEVIATION)
+        return np.concatenate([[fixed, fixed, own.compass.heading_deviation], walking])
+
+    def reference(self, motion: Motion) -> np.ndarray:
+        """The reported positions."""
+        return motion.positions
+
+    def gain(self, nodes: np.ndarray) -> np.ndarray:
+        return (1.0 + nodes[..., SCALE]) * np.exp(1j * nodes[..., DIRECTION])
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        step = after.positions - before.positions
+        error = stretched(step, self.gain(nodes), nodes[:, YAW]) - step
+        result = nodes.copy()
+        result[:, 0] += error.real
+        result[:, 1] += error.imag
+        return result
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        values, slopes = np.zeros(DRIFT_STATES), np.zeros((DRIFT_STATES, self.width))
+        values[3:] = node[[SCALE, DIRECTION]]
+        slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
+        return Drift(values, slopes)
+
+    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
+        starts = layout.node_start(np.arange(layout.first, layout.last))
+        durations = motion.durations
+        self._add_positions(equations, starts, nodes, motion, durations)
+        add_changes(equations, starts, nodes, self._changes(durations))
+
+    def _changes(self, durations: np.ndarray) -> Changes:
+        """Return how the errors of the odometry change from node to node."""
+        own = self._parameters
+        return {
+            YAW: own.compass.change(durations),
+            DIRECTION: walk(own.direction_walk, durations),
+            SCALE: walk(0.0, durations),
+        }
+
+    def _add_positions(
+        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion, durations: np.ndarray
+    ) -> None:
+        """Add the steps. While positions are held nobody knows how far the vehicle goes.
+
+        Noise is one of the reported velocities, so the residuals are those per unit of scale. The derivative by the
+        scale contains that; else the fit would shrink the world to make them smaller.
+        """
+        step = np.diff(motion.positions)
+        one = np.ones(len(starts))
+        yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
+        turned_step = product(np.exp(1j * (nodes[:-1, DIRECTION] + yaw)), step)
+        scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
+        change = np.diff(as_complex(nodes))
+        residual = change - (scaled - step) - self._carried(nodes[:-1], durations)
+        unknown = (_HELD_SPEED * np.diff(motion.held)) ** 2
+        weight = 1.0 / (self._parameters.position_walk**2 * durations + unknown + _ROUNDING_VARIANCE)
+        for axis, part in ((0, np.real), (1, np.imag)):
+            places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *self._carriers(axis))
+            by_angle = -part(1j * scaled)
+            slopes = (one, -one, by_angle, -part(turned_step) - part(residual), by_angle / 2.0, by_angle / 2.0)
+            slopes += tuple(-durations for _ in self._carriers(axis))
+            columns = starts[:, np.newaxis] + np.array(places)
+            equations.add(columns, np.column_stack(slopes), part(residual), weight)
+
+    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
+        """Return the moves (n,) x + i y [m] in map that the odometry cannot feel."""
+        return np.zeros(len(nodes), dtype=np.complex128)
+
+    def _carriers(self, axis: int) -> tuple:
+        """Return the columns of the velocities that make those moves along an axis."""
+        return ()
+
+
+class ThrusterFactors(DvlFactors):
+    """Nodes have columns x, y, yaw, direction [rad] and scale as DvlFactors, and the current x, y in map [m/s]."""
+
+    width = 7
+
+    def __init__(self, parameters: ThrusterOdometry) -> None:
+        super().__init__(parameters)
+        self._own = parameters
+
+    @property
+    def freed(self) -> "ThrusterFactors":
+        scale = {"scale_deviation": _FREED_SCALE, "scale_walk": _FREED_SCALE_WALK}
+        return ThrusterFactors(replace(self._own, compass=self._own.compass.freed, **scale))
+
+    def first_node(self) -> np.ndarray:
+        return np.append(super().first_node(), [0.0, 0.0])
+
+    def first_deviations(self) -> np.ndarray:
+        current = max(self._own.current_deviation, HELD_DEVIATION)
+        return np.append(super().first_deviations(), [current, current])
+
+    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
+        result = super().advanced(nodes, before, after)
+        result[:, :2] += nodes[:, _CURRENT] * (after.times - before.times)[:, np.newaxis]
+        return result
+
+    def drift(self, node: np.ndarray, heading: float) -> Drift:
+        known = super().drift(node, heading)
+        values, slopes = known.values, known.slopes
+        to_base = np.array([[np.cos(heading), np.sin(heading)], [-np.sin(heading), np.cos(heading)]])
+        values[:2] = to_base @ node[_CURRENT]
+        slopes[:2, _CURRENT] = to_base
+        return Drift(values, slopes)
+
+    def _changes(self, durations: np.ndarray) -> Changes:
+        own, current = self._own, walk(self._own.current_walk, durations)
+        changed = {SCALE: walk(own.scale_walk, durations), CURRENT_X: current, CURRENT_Y: current}
+        return {**super()._changes(durations), **changed}
+
+    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
+        return as_complex(nodes[:, _CURRENT]) * durations
+
+    def _carriers(self, axis: int) -> tuple:
+        return (CURRENT_X + axis,)
+
+
+class OdometryDoubt(NamedTuple):
+    """dvl_share: the probability that the odometry is a DVL's.
+
+    scale_deviation, current_deviation [m/s]: if it is not. no_current: m/s, stands for none. current_told: m/s,
+    standard deviation from which on the echoes are asked whether there is a current. scale_walk [1/sqrt(s)],
+    current_walk [m/s/sqrt(s)]: how fast what the echoes told is forgotten.
+    """
+
+    dvl_share: float
+    scale_deviation: float
+    current_deviation: float
+    no_current: float
+    current_told: float
+    scale_walk: float
+    current_walk: float
+
+
+class UnsureFactors(ThrusterFactors):
+    """As ThrusterFactors, of an odometry that may be a DVL's, of which `rival` is the model.
+
+    Scale and current do not walk within the window of the live solver, nor within a run that is refined.
+    """
+
+    def __init__(self, dvl: DvlOdometry, doubt: OdometryDoubt) -> None:
+        own = {field.name: getattr(dvl, field.name) for field in fields(DvlOdometry)}
+        own["scale_deviation"] = doubt.scale_deviation
+        super().__init__(
+            ThrusterOdometry(**own, scale_walk=0.0, current_deviation=doubt.current_deviation, current_walk=0.0)
+        )
+        self._rival = DvlFactors(dvl)
+        still, flowing = doubt.no_current, doubt.current_deviation
+        share = (1.0 - doubt.dvl_share) / 2.0
+        components = (
+            PriorComponent("THRUSTERS", share, np.array([doubt.scale_deviation, still, still])),
+            PriorComponent("THRUSTERS in a current", share, np.array([doubt.scale_deviation, flowing, flowing])),
+        )
+        self._mixture = PriorMixture(
+            columns=(SCALE, CURRENT_X, CURRENT_Y),
+            mean=np.array([dvl.scale, 0.0, 0.0]),
+            widest=components[-1].deviations,
+            told=np.array([np.inf, doubt.current_told, doubt.current_told]),
+            walks=np.array([doubt.scale_walk, doubt.current_walk, doubt.current_walk]),
+            components=components,
+            rival=PriorComponent("DVL", doubt.dvl_share, np.array([dvl.scale_deviation, still, still])),
+        )
+
+    @property
+    def mixture(self) -> PriorMixture:
+        return self._mixture
+
+    @property
+    def rival(self) -> DvlFactors:
+        return self._rival
