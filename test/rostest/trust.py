@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""A tour on the chart, broken five times: mlsm_core goes on, names what happened, and tells how uncertain it is."""
+"""A tour on the chart, broken six times: mlsm_core goes on, names what happened, and tells how uncertain it is."""
 
 import unittest
 from typing import List
@@ -96,6 +96,17 @@ class Trust(unittest.TestCase):
             self.assert_goes_on()
         self.diagnostics.wait_for("mlsm_core", "jumps in time", 2)
 
+    def test_4_a_clock_that_stands_while_the_vehicle_goes_on_is_named_and_the_path_goes_on(self) -> None:
+        """First it goes on from where it stood, then it jumps ahead to the true time."""
+        for number, lost in enumerate((12.0, 0.0), start=1):
+            for _ in range(12):
+                type(self).seconds += STEP
+                type(self).shift -= STEP
+                self.tf.publish(TFMessage([self.odometry()]))
+            self.diagnostics.wait_for("mlsm_core", "clocks that stood while the vehicle moved", number)
+            type(self).shift += 12.0 - lost
+            self.assert_goes_on()
+
     def test_5_a_place_that_somebody_points_at_is_searched(self) -> None:
         """They point .7 m beside it."""
         pose = PoseWithCovarianceStamped()
@@ -148,10 +159,7 @@ class Trust(unittest.TestCase):
     def send_odometry(cls) -> None:
         """Send clock and odometry, and wait until map -> odom follows."""
         cls.seconds += STEP
-        x, y, yaw = composed(cls.offset, truth(cls.seconds))
-        message = transform("odom", "base_link", cls.stamp(), x)
-        message.transform.translation.y = y
-        message.transform.rotation.z, message.transform.rotation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
+        message = cls.odometry()
         strangers = [transform(one.header.frame_id, one.child_frame_id, cls.stamp()) for one in cls.strangers]
         cls.tf.publish(TFMessage([message, *strangers]))
         # Clock and odometry come on two connections: while the first tick is answered, the odometry arrives, too.
@@ -159,6 +167,14 @@ class Trust(unittest.TestCase):
             cls.clock.publish(Clock(rospy.Time.from_sec(seconds)))
             sent = seconds + MlsmCoreParameters.transform_tolerance
             cls.corrections.wait_for(lambda found, sent=sent: abs(stamp_of(found) - sent) < 1e-3)
+
+    @classmethod
+    def odometry(cls) -> TransformStamped:
+        x, y, yaw = composed(cls.offset, truth(cls.seconds))
+        message = transform("odom", "base_link", cls.stamp(), x)
+        message.transform.translation.y = y
+        message.transform.rotation.z, message.transform.rotation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
+        return message
 
     @classmethod
     def stamp(cls) -> float:

@@ -245,6 +245,10 @@ class Localiser:
                 self._expect(place.correction, place.widened)
         return until - time
 
+    def notice_standing(self, stood: Sequence[Tuple[float, float]]) -> None:
+        """Learn from when to when [s] stamps of the odometry went on after its clock had stood; `stood` may grow."""
+        self._odometry.stood = stood
+
     def expect(self, pose: np.ndarray, covariance: np.ndarray, odometry: np.ndarray) -> None:
         """Take T_map_base `pose` (3,), with its covariance (3, 3), as where somebody sees the vehicle now.
 

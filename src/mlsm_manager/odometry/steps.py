@@ -3,7 +3,7 @@
 import threading
 from dataclasses import dataclass
 from enum import Enum
-from typing import List
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -60,7 +60,9 @@ class ContinuousOdometry:
     """Follows T_odom_base and says what has to be put before it, so that it never jumps.
 
     A step is left out in the vehicle's frame: it goes on with the speed of the step before. So positions and headings
-    after a step hang together as they were reported.
+    after a step hang together as they were reported. What it reports at once after its clock has stood is no step.
+
+    stood: from when to when [s] its stamps went on after they had stood.
 
     Safe to use from several threads: one gives it scans, another asks for what holds now.
     """
@@ -68,6 +70,7 @@ class ContinuousOdometry:
     def __init__(self, limits: MotionLimits) -> None:
         self._limits = limits
         self._lock = threading.Lock()
+        self.stood: Sequence[Tuple[float, float]] = ()
         self.clear()
 
     def clear(self) -> None:
@@ -96,10 +99,14 @@ class ContinuousOdometry:
         else:
             known = 1
         for number in impossible_steps(track, self._limits):
-            if number >= known:
+            if number >= known and not self._stood_until(*track.times[number - 1 : number + 1]):
                 self._leave_out(track, number)
         self._newest = Track(track.times[-_AROUND:], track.poses[-_AROUND:])
         self._known = True
+
+    def _stood_until(self, before: float, after: float) -> bool:
+        """Return whether a clock that had stood went on between two times [s]."""
+        return any(before < end and after > begin for begin, end in list(self.stood))
 
     def _leave_out(self, track: Track, number: int) -> None:
         """Let the odometry go on without the step to pose `number`."""

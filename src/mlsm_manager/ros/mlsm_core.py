@@ -59,6 +59,7 @@ class MlsmCore:
         self._odometry = OdometryTrack(
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
+        self._localiser.notice_standing(self._odometry.stood)
         self._mounted = False
         self._steps_told = 0
         self._z_down = ZDownSigns()

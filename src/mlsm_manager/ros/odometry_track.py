@@ -1,6 +1,6 @@
 """The vehicle's way by odometry, from tf."""
 
-from typing import Optional, Tuple
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -28,6 +28,11 @@ class OdometryTrack:
     def check_stamp(self, stamp_ns: int) -> None:
         """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
         self._transforms.check_stamp(stamp_ns)
+
+    @property
+    def stood(self) -> Sequence[Tuple[float, float]]:
+        """From when to when [s] stamps went on after a clock had stood."""
+        return self._transforms.clock.stood
 
     def clear(self) -> None:
         """Forget the past, because time jumped."""

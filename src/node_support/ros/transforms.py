@@ -20,6 +20,7 @@ from node_support.geometry import quaternion_of, rotation_matrices
 from node_support.headers import DAY, check_frame, check_stamp
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
+from node_support.standing_clock import StandingClock
 
 JUMP_BACK = 1.0
 """Stamps that go back by more than this [s] mean that time jumped; messages overtake each other by less."""
@@ -37,7 +38,8 @@ class TfBuffer:
     """Remembers transforms, answers at stamps and waits for transforms to come.
 
     Transforms that tf2 cannot take are refused and counted. When the stamps of a frame go back by more than
-    `JUMP_BACK`, as when a bag loops, all transforms that change are forgotten.
+    `JUMP_BACK`, as when a bag loops, all transforms that change are forgotten. A clock that stands while a frame moves
+    is counted, see `clock`.
     """
 
     def __init__(
@@ -56,6 +58,7 @@ class TfBuffer:
         self._newest_ns: Dict[str, int] = {}
         self._parent = parent
         self._parents: Dict[str, Tuple[str, float]] = {}
+        self.clock = StandingClock()
         for topic, add in ((topics.TRANSFORMS, self._add), (topics.STATIC_TRANSFORMS, self._add_static)):
             rospy.Subscriber(topic, TFMessage, guarded(health, self._taker(add)), queue_size=_QUEUE_SIZE)
 
@@ -141,6 +144,11 @@ class TfBuffer:
         self._check(transform)
         if stamp_ns < self._newest_ns.get(child, 0) - JUMP_BACK * 1e9:
             self.clear()
+        if self.clock.take((child, publisher), stamp_ns, transform.transform):
+            detail = f"{child!r} moves, and stays at {stamp_ns * 1e-9:.3f} s; check the clock of {publisher}"
+            self._health.problem("clocks that stood while the vehicle moved", detail)
+        if stamp_ns == self._newest_ns.get(child):
+            return  # tf2 would leave it out, too, and write a line for each
         self._buffer.set_transform(transform, publisher)
         self._newest_ns[child] = max(stamp_ns, self._newest_ns.get(child, 0))
 

@@ -109,12 +109,16 @@ class TransformFilter(message_filters.SimpleFilter):
     def add(self, beam: Beam, is_moving: bool = False) -> None:
         """Queue a beam and whether the vehicle moved when it came; returns at once.
 
-        Raises RefusedInput for a stamp that is not near odometry or clock, and for a beam out of order.
+        Raises RefusedInput for a stamp that is not near odometry or clock or stays while the vehicle moves, and for a
+        beam out of order.
         """
         self._transforms.check_stamp(beam.stamp_ns)
         with self._condition:
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
+            if beam.stamp_ns == self._newest_ns and self._transforms.clock.stands_at(beam.stamp_ns):
+                detail = f"at {beam.stamp_ns * 1e-9:.3f} s, nobody knows where the sonar was; check the clocks"
+                raise RefusedInput("beams of a clock that stands", detail)
             self._newest_ns = beam.stamp_ns
             dropped = self._queue.add(beam, is_moving)
             if dropped is not None:

@@ -69,6 +69,23 @@ def test_what_tf_does_not_know_is_told_with_its_reason(tf):
         tf.x(CLOCK, source="nowhere")
 
 
+def test_a_clock_that_stands_while_a_frame_moves_is_counted_once_and_known_by_when_it_goes_on(tf):
+    for x in range(9):
+        tf.send(transform(CLOCK, x=float(x)))
+    assert tf.buffer.clock.stands_at(int(CLOCK * SECOND))
+    tf.send(transform(CLOCK + 1.0, x=9.0))
+    assert not tf.buffer.clock.stands_at(int((CLOCK + 1.0) * SECOND))
+    assert list(tf.buffer.clock.stood) == [(CLOCK, CLOCK + 1.0)]
+    assert tf.health.report().values["clocks that stood while the vehicle moved"] == "1"
+
+
+def test_a_vehicle_at_rest_whose_transform_is_sent_again_and_again_has_no_clock_that_stands(tf):
+    for _ in range(20):
+        tf.send(transform(CLOCK, x=1.0))
+    tf.send(transform(CLOCK + 1.0, x=1.0))
+    assert not tf.buffer.clock.stood
+
+
 @pytest.mark.parametrize("seconds", [0.0, 2.0**31 - 1e-9, 2.0**31, 4294967295.9])
 def test_a_stamp_that_would_end_the_process_reaches_tf2_neither_as_question_nor_as_transform(tf, seconds):
     tf.send(transform(CLOCK, x=1.0))
