@@ -9,6 +9,11 @@ from typing import Any, Callable
 
 from numba import config, njit
 
+LONGEST_DESCRIPTION = 40
+"""Bytes by which numba may tell the types of a tuple: two and eight for each array; of a named tuple the names, too.
+
+Numba 0.56 forgets the beginning of a longer one, takes it for a new one with nearly each call, and keeps it for ever.
+"""
 _ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
 
 
@@ -17,7 +22,8 @@ def compiled(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], 
 
     signature, options: as numba.njit takes them. With a signature the loop is compiled, or read from the cache, when
     its module is imported, otherwise when it is called first with arguments of new types. Arrays of messages are
-    read-only. Raises ImportError where numba finds no folder, not even a temporary one.
+    read-only. Tuples as arguments must be short, see LONGEST_DESCRIPTION. Raises ImportError where numba finds no
+    folder, not even a temporary one.
     """
     _prepare_cache()
     return njit(*signature, cache=True, **options)

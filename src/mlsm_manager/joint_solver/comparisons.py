@@ -125,7 +125,7 @@ def summed(
     others = own if targets is sources else _packed(targets)
     widening = max(1.0, cut / parameters.cut)
     noise = Noise(parameters.echo_deviation**2, parameters.beam_half_width**2, parameters.weight)
-    return summed_comparisons(pairs, own, others, noise, widening)
+    return summed_comparisons(tuple(pairs), own, others, noise, widening)
 
 
 def _packed(points: PlacedPoints) -> Packed:

@@ -31,19 +31,19 @@ class Surfaces(NamedTuple):
     """What n points lie on: normals (n, 2), and how well they are known (n,)."""
 
     normals: np.ndarray
-    qualities: np.ndarray
+    quality: np.ndarray
 
 
 class Limits(NamedTuple):
-    """Pairs count up to `near` [m] fully, and less up to `cut` [m]; likewise from `full_cosine` on, and from the least.
+    """Pairs count up to `near` [m] fully, and less up to `cut` [m].
 
-    The cosine is that between both normals.
+    Likewise from a cosine of `full` between both normals on, and less from `least`.
     """
 
     cut: float
     near: float
-    least_cosine: float
-    full_cosine: float
+    least: float
+    full: float
 
 
 class Packed(NamedTuple):
@@ -89,8 +89,8 @@ def weighed_pairs(found, sources, targets, limits):
         i, j = rows[pair], neighbours[pair]
         cosine = sources.normals[i, 0] * targets.normals[j, 0] + sources.normals[i, 1] * targets.normals[j, 1]
         faded = _ramp(distances[pair], limits.cut, limits.near)
-        faded *= _ramp(cosine, limits.least_cosine, limits.full_cosine)
-        weight = shares[pair] * faded * sources.qualities[i] * targets.qualities[j]
+        faded *= _ramp(cosine, limits.least, limits.full)
+        weight = shares[pair] * faded * sources.quality[i] * targets.quality[j]
         if weight > 0.0:
             own[made], met[made], importance[made] = i, j, weight
             made += 1
@@ -199,13 +199,15 @@ def _write_sums(slopes, residuals, weights, information, gradient):
 
 
 @compiled(
-    types.Tuple((_ROWS, _ROWS, float64[:, :, ::1], _TABLE))(_PAIRS, _PACKED, _PACKED, _NOISE, float64),
+    types.Tuple((_ROWS, _ROWS, float64[:, :, ::1], _TABLE))(
+        types.Tuple((_ROWS, _ROWS, _VALUES)), _PACKED, _PACKED, _NOISE, float64
+    ),
     error_model="numpy",
 )
 def summed_comparisons(pairs, sources, targets, noise, widening):
     """Return both scans (g,), information (g, c, c) and gradient (g, c) of each pair of scans; c is PAIR_COLUMNS.
 
-    Pairs whose sources are of one scan follow each other. widening: of the robust kernel.
+    pairs: members of Pairs; those whose sources are of one scan follow each other. widening: of the robust kernel.
     """
     rows, neighbours, importance = pairs
     group_of, scans, other_scans = _groups_of(rows, neighbours, sources.scans, targets.scans)

@@ -1,26 +1,15 @@
 """Where points of scans lie in the map, in a loop that is compiled on import: never while a scan waits."""
 
 from dataclasses import dataclass, fields, replace
-from typing import NamedTuple, Union
+from typing import Union
 
 import numpy as np
 from numba import float64, int64, types
 
 from node_support.numba_cache import compiled
 
-
-class Heard(NamedTuple):
-    """n points by the vehicle: when they were heard [s], after which nodes, how far off [m], where [rad], normals."""
-
-    times: np.ndarray
-    legs: np.ndarray
-    ranges: np.ndarray
-    bearings: np.ndarray
-    normals: np.ndarray
-
-
 _VALUES, _TABLE = float64[::1], float64[:, ::1]
-_HEARD = types.NamedTuple((_VALUES, int64[::1], _VALUES, _VALUES, _TABLE), Heard)
+_HEARD = types.Tuple((_VALUES, int64[::1], _VALUES, _VALUES))
 TIME, NODE_X, NODE_Y, NODE_YAW, REFERENCE_X, REFERENCE_Y, GAIN_X, GAIN_Y = range(8)
 """Columns of the nodes: time, place, yaw, reference path, and gain from each to the next and beyond the last."""
 KNOT_TIME, KNOT_YAW, KNOT_X, KNOT_Y = range(4)
@@ -97,14 +86,15 @@ def path_rows(times, nodes, knots):
     return result
 
 
-@compiled(_TABLE(_HEARD, _VALUES, float64, _TABLE, _TABLE, float64), error_model="numpy")
-def placed_rows(heard, sonar_in_base, range_scale, nodes, knots, half_window):
+@compiled(_TABLE(_HEARD, _TABLE, _VALUES, float64, _TABLE, _TABLE, float64), error_model="numpy")
+def placed_rows(heard, normals, sonar_in_base, range_scale, nodes, knots, half_window):
     """Return points (n, PLACED_COLUMNS), heard between their nodes and the next ones.
 
+    heard: times (n,) [s], after which nodes, how far off [m] and where [rad] by the vehicle. normals: (n, 2) by it.
     nodes: (m, 8). knots: (k, 4), k > 0, all that is around the times. half_window: s before and after, over which the
     velocity is averaged.
     """
-    times, legs, ranges, bearings, normals = heard
+    times, legs, ranges, bearings = heard
     result, knot = np.empty((len(times), PLACED_COLUMNS)), 0
     for point in range(len(times)):
         time, node, next_node = times[point], nodes[legs[point]], nodes[legs[point] + 1]

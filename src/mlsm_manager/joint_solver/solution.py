@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, Layout, NormalEquations, State
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.placement import NO_POINTS, Heard, PlacedPoints, path_rows, placed_rows
+from mlsm_manager.joint_solver.placement import NO_POINTS, PlacedPoints, path_rows, placed_rows
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 from mlsm_manager.joint_solver.run_log import PointTable, RunLog
 from node_support.geometry import inverse, transformed
@@ -190,10 +190,10 @@ class Solution:
         times = points.times + state.run[DELAY]
         nodes = np.unique(np.concatenate([scans, scans + 1]))
         known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)
-        heard = Heard(times, np.searchsorted(nodes, scans), points.ranges, points.bearings, points.normals)
+        heard = times, np.searchsorted(nodes, scans), points.ranges, points.bearings
         legs = _legs(log.odometry, self.odometry, log.node_times[nodes], state.nodes[nodes])
         knots, scale = _knots(self.odometry, known), float(state.run[RANGE_SCALE])
-        found = placed_rows(heard, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
+        found = placed_rows(heard, points.normals, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
         return PlacedPoints(
             scans=scans, places=found[:, 0:2], arms=found[:, 2:4], normals=found[:, 4:6], slants=points.slants,
             qualities=points.qualities, shares=found[:, 10], by_run=found[:, 6:10].reshape(-1, 2, 2),

@@ -16,19 +16,6 @@ _PAUSE = 0.001  # s between two pieces: a lock that is taken again at once is ne
 _MIN_ROWS = 1024  # reserved from the start (96 kB), so that small maps do not grow scan by scan
 
 
-class StoreArrays(NamedTuple):
-    """Arrays that compiled loops read and write.
-
-    rows: (n, ROW_WIDTH). following: (n,) the row that follows each in its cell. crossed: (n,). heads: (s,) the first
-    rows of all cells.
-    """
-
-    rows: np.ndarray
-    following: np.ndarray
-    crossed: np.ndarray
-    heads: np.ndarray
-
-
 class Runs(NamedTuple):
     """All blocks (m) of the cells that something went into, by cell, then by bottom.
 
@@ -82,9 +69,13 @@ class BlockStore:
         return copy
 
     @property
-    def arrays(self) -> StoreArrays:
-        """All arrays, good until the store grows."""
-        return StoreArrays(self._rows, self._following, self._crossed, self._index.heads)
+    def arrays(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+        """All arrays, good until the store grows, for compiled loops to read and write.
+
+        The blocks (n, ROW_WIDTH), the row (n,) that follows each in its cell, what crossed them (n,), and the first
+        rows (s,) of all cells.
+        """
+        return (self._rows, self._following, self._crossed, self._index.heads)
 
     def slots(self, cells: np.ndarray) -> np.ndarray:
         """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
@@ -110,7 +101,7 @@ class BlockStore:
         new = runs.row < 0
         runs.row[new] = self._take(int(np.count_nonzero(new)))
         self._announce(runs.row[runs.changed])
-        _write(runs, self.arrays, slots)
+        _write(runs[:-1], runs.changed, self.arrays, slots)
 
     def remove(self, rows: np.ndarray, cells: np.ndarray) -> None:
         """Forget the blocks in `rows` (n,), all of them in cells with keys `cells` (c,), none twice."""
@@ -154,32 +145,37 @@ def _longer(array: np.ndarray, length: int) -> np.ndarray:
 
 
 @compiled()
-def _write(runs, held, slots):
-    """Write Runs, which all have rows, into the chains of the cells at `slots` (c,); held: StoreArrays."""
-    for run in range(len(runs.row)):
-        row, cell = runs.row[run], runs.cell[run]
-        if runs.changed[run]:
-            held.rows[row], held.crossed[row] = runs.blocks[run], runs.crossed[run]
-        if run == 0 or runs.cell[run - 1] != cell:
-            held.heads[slots[cell]] = row
-        is_last = run + 1 == len(runs.row) or runs.cell[run + 1] != cell
-        held.following[row] = NO_BLOCK if is_last else runs.row[run + 1]
+def _write(runs, changed, held, slots):
+    """Write Runs, which all have rows, into the chains of the cells at `slots` (c,).
+
+    runs: their members without the last, which is `changed`. held: the store's arrays.
+    """
+    (blocks, run_rows, cells, run_crossed), (rows, following, crossed, heads) = runs, held
+    for run in range(len(run_rows)):
+        row, cell = run_rows[run], cells[run]
+        if changed[run]:
+            rows[row], crossed[row] = blocks[run], run_crossed[run]
+        if run == 0 or cells[run - 1] != cell:
+            heads[slots[cell]] = row
+        is_last = run + 1 == len(run_rows) or cells[run + 1] != cell
+        following[row] = NO_BLOCK if is_last else run_rows[run + 1]
 
 
 @compiled()
 def _unlink_released(held, slots):
-    """Let the chains of the cells at `slots` (c,) lead past rows without points; held: StoreArrays."""
+    """Let the chains of the cells at `slots` (c,) lead past rows without points; held: the store's arrays."""
+    rows, following, _, heads = held
     for slot in slots:
-        before, row = NO_BLOCK, held.heads[slot]
+        before, row = NO_BLOCK, heads[slot]
         while row != NO_BLOCK:
-            following = held.following[row]
-            if held.rows[row, COUNT] > 0.0:
+            after = following[row]
+            if rows[row, COUNT] > 0.0:
                 before = row
             elif before == NO_BLOCK:
-                held.heads[slot] = following
+                heads[slot] = after
             else:
-                held.following[before] = following
-            row = following
+                following[before] = after
+            row = after
 
 
 class RunningCopy:

@@ -53,7 +53,7 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
 
 def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups, resolution: float) -> None:
     slots = store.slots(cells)
-    runs, fused = _linked(groups, store.arrays, slots, resolution)
+    runs, fused = _merged_runs(tuple(groups), store.arrays, slots, resolution)
     store.write(slots, runs, fused)
 
 
@@ -71,25 +71,26 @@ def compile_loops() -> None:
 
 
 @compiled()
-def _linked(groups, held, slots, resolution):
+def _merged_runs(groups, held, slots, resolution):
     """Return the Runs of the cells at `slots` (c,) after the Groups went into them, each cell at least one, and the row
     numbers (f,) of stored blocks that are part of others by then.
 
-    held: StoreArrays. A merged block keeps the highest row of its parts. What is new resets its crossings: a beam has
-    just hit it.
+    groups: their members. held: the store's arrays. A merged block keeps the highest row of its parts. What is new
+    resets its crossings: a beam has just hit it.
     """
-    rows, most = held.rows, len(groups.rows) + _stored_count(held.following, held.heads, slots)
+    (group_rows, group_cells, group_crossed), (rows, following, _, heads) = groups, held
+    most = len(group_rows) + _stored_count(following, heads, slots)
     blocks, row, owner = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64), np.empty(most, np.int64)
     crossed, changed = np.zeros(most, np.uint16), np.empty(most, np.bool_)
     parts, part_rows = np.empty((most, ROW_WIDTH)), np.empty(most, np.int64)
     stored, fused = np.empty(most, np.int64), np.empty(most, np.int64)
     made, gone, group = 0, 0, 0
     for cell in range(len(slots)):
-        old = _stored_by_bottom(rows, held.following, held.heads[slots[cell]], stored)
+        old = _stored_by_bottom(rows, following, heads[slots[cell]], stored)
         reached, length, looked_at = -np.inf, 0, 0
         while True:
-            is_new = group < len(groups.rows) and groups.cell[group] == cell
-            new_bottom = groups.rows[group, BOTTOM] if is_new else np.inf
+            is_new = group < len(group_rows) and group_cells[group] == cell
+            new_bottom = group_rows[group, BOTTOM] if is_new else np.inf
             old_bottom = rows[stored[looked_at], BOTTOM] if looked_at < old else np.inf
             bottom = min(new_bottom, old_bottom)
             if length and (bottom == np.inf or bottom - reached >= resolution):
@@ -101,8 +102,8 @@ def _linked(groups, held, slots, resolution):
             if bottom == np.inf:
                 break
             if new_bottom <= old_bottom:
-                parts[length], part_rows[length] = groups.rows[group], -1
-                crossed[made] = max(crossed[made], groups.crossed[group])
+                parts[length], part_rows[length] = group_rows[group], -1
+                crossed[made] = max(crossed[made], group_crossed[group])
                 group += 1
             else:
                 parts[length], part_rows[length] = rows[stored[looked_at]], stored[looked_at]

@@ -1,16 +1,23 @@
 """What a long live run forgets, and what it keeps."""
 
+import sys
+
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import followed, solver_parameters
+from numba._dispatcher import compute_fingerprint
+from numba.core.dispatcher import Dispatcher
 
 from mlsm_manager.joint_solver import live_solver
 from mlsm_manager.joint_solver.live_window import nearest_groups, superfluous
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation import joint_session
+from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
+from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from node_support.numba_cache import LONGEST_DESCRIPTION
 
 SCANS = tour(12).scans
 EVERY_THIRD = np.arange(len(SCANS)) % 3 == 0
@@ -144,6 +151,35 @@ def test_scans_are_kept_for_storing_only_as_many_as_are_stored(monkeypatch):
         session.add(scan)
         assert session.may_be_stored == (number <= 5)
         assert len(session.scans) == (number if number <= 5 else 0)
+
+
+def test_numba_keeps_no_description_of_the_arguments_of_each_call(monkeypatch):
+    """It keeps one of each kind, unless it is too long."""
+    lengths = {}
+    for module in [sys.modules[name] for name in sorted(sys.modules) if name.startswith("mlsm_manager.")]:
+        for name, loop in list(vars(module).items()):
+            if isinstance(loop, Dispatcher):
+                monkeypatch.setattr(module, name, watched(loop, lengths))
+    session = session_of(SCANS[:4], solver_parameters())
+    made = KeyframeMap(0.5, 1000.0)
+    for scan in SCANS[:4]:
+        made.add(MapCloud.of_scan(scan))
+        made.draw(session, np.inf)
+    made.map.remove(np.arange(3))
+    assert {"weighed_pairs", "placed_rows", "summed_comparisons"} <= set(lengths)
+    assert {name: length for name, length in lengths.items() if length > LONGEST_DESCRIPTION} == {}
+
+
+def watched(loop, lengths):
+    """Return a compiled loop that tells the length of the longest description of its tuples, by its name."""
+
+    def call(*arguments):
+        found = [len(compute_fingerprint(one)) for one in arguments if isinstance(one, tuple)]
+        name = loop.py_func.__name__
+        lengths[name] = max([lengths.get(name, 0), *found])
+        return loop(*arguments)
+
+    return call
 
 
 def test_no_scan_that_is_stored_with_a_run_is_forgotten():
