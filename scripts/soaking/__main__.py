@@ -27,7 +27,7 @@ _STALLED = 300.0  # s of the wall clock without progress
 
 
 def soak(options: argparse.Namespace, folder: Path) -> bool:
-    """Run the graph for so many simulated hours; print what it took, return whether all is as wanted.
+    """Run the graph for so many simulated hours, or until Ctrl-C; print what it took, return whether all is as wanted.
 
     Raises DemoError when it does not go on.
     """
@@ -41,8 +41,14 @@ def soak(options: argparse.Namespace, folder: Path) -> bool:
         graph.wait_for_master()
         rospy.init_node("soak", anonymous=True, disable_signals=True)
         listener = Listener()
-        samples = _samples(graph, listener, folder)
-        _wait_for_rest(listener)
+        samples: List[Sample] = []
+        try:
+            _sample_all(graph, listener, folder, samples)
+            _wait_for_rest(listener)
+        except KeyboardInterrupt:
+            if not samples:
+                raise
+            print(f"soak: stopped after {listener.hours:.1f} h; what has been until then:", file=sys.stderr)
         table = rows(samples, listener, (folder / "roslaunch.log").read_text(errors="replace"))
         print_table([row[:3] for row in table])
         for row in (row for row in table if not row.holds):
@@ -52,9 +58,8 @@ def soak(options: argparse.Namespace, folder: Path) -> bool:
         graph.stop()
 
 
-def _samples(graph: Graph, listener: Listener, folder: Path) -> List[Sample]:
-    """Return a sample for each simulated minute of the run; print one an hour."""
-    samples: List[Sample] = []
+def _sample_all(graph: Graph, listener: Listener, folder: Path, samples: List[Sample]) -> None:
+    """Append a sample for each simulated minute of the run; print one an hour."""
     hour, progress, moved = 0, 0.0, time.monotonic()
     while listener.progress < 1.0:
         graph.check()
@@ -70,22 +75,23 @@ def _samples(graph: Graph, listener: Listener, folder: Path) -> List[Sample]:
                 hour += 1
     samples.append(_sample(graph, listener, folder))
     samples[-1].tell(samples[0])
-    return samples
 
 
 def _wait_for_rest(listener: Listener) -> None:
     """Wait until all beams have arrived and nothing changes any more, but not for ever."""
     end, before = time.monotonic() + _LATE, {}
-    while time.monotonic() < end and (not listener.all_arrived or listener.counts != before):
+    while time.monotonic() < end and (listener.waiting or listener.counts != before):
         before = dict(listener.counts)
         time.sleep(_AT_REST)
 
 
 def _sample(graph: Graph, listener: Listener, folder: Path) -> Sample:
-    waiting = listener.value("sonar_simulator", "beams out") - listener.value("sonar_to_cloud", "beams placed")
     disk = sum(one.stat().st_size for one in folder.rglob("*") if one.is_file()) / 1e6
-    blocks = listener.value("mlsm_core", "blocks")
-    return Sample(listener.hours, time.monotonic(), held_below(graph.pid), waiting, disk, blocks)
+    scans, blocks = (listener.value("mlsm_core", each) for each in ("scans in", "blocks"))
+    held = held_below(graph.pid)
+    return Sample(
+        listener.hours, time.monotonic(), held, listener.waiting, disk, blocks, max(scans, 0), listener.match_time
+    )
 
 
 def main() -> int:

@@ -20,6 +20,7 @@ COUNTED = {
     "/MLSM/pose": (("mlsm_core", "scans matched"),),
 }
 """Topics whose messages are counted, and the counters of nodes that must tell the same number."""
+_SENT, _ARRIVED, _LOST = "beams out", "beams placed", "beams without transform"
 _TRUTHS = 2000  # a hundred seconds of the simulated clock: fixes come late
 _DIGITS = re.compile(r"-?\d+(\.\d+)?")
 
@@ -55,10 +56,16 @@ class Listener:
         """Simulated hours since the first message of the clock."""
         return (self.now - self.start) / 3600.0
 
-    def value(self, stage: str, counter: str) -> int:
-        """Return a counter as a stage told it last; -1 where it told none."""
+    def value(self, stage: str, counter: str, untold: int = -1) -> int:
+        """Return a counter as a stage told it last; `untold` where it told none."""
         with self._lock:
-            return int(self._stages.get(stage, {}).get(counter, -1))
+            return int(self._stages.get(stage, {}).get(counter, untold))
+
+    @property
+    def match_time(self) -> float:
+        """What the newest scan cost the solver, ms of the wall clock; NaN before the first."""
+        with self._lock:
+            return float(self._stages.get("mlsm_core", {}).get("match time [ms]", "nan"))
 
     @property
     def has_begun(self) -> bool:
@@ -66,9 +73,14 @@ class Listener:
         return self.start == self.start and self.value("mlsm_core", "blocks") >= 0
 
     @property
-    def all_arrived(self) -> bool:
-        """Whether all beams that were sent have been placed."""
-        return self.value("sonar_simulator", "beams out") == self.value("sonar_to_cloud", "beams placed")
+    def waiting(self) -> int:
+        """How many beams are on their way: sent, neither placed nor lost."""
+        return self.value("sonar_simulator", _SENT) - self.value("sonar_to_cloud", _ARRIVED) - self.lost
+
+    @property
+    def lost(self) -> int:
+        """How many beams were dropped because too many newer ones waited, or tf did not place them."""
+        return self.value("sonar_to_cloud", _LOST, untold=0)
 
     def internal_errors(self) -> Dict[str, int]:
         """Return how many internal errors each stage counts, of those that count any."""

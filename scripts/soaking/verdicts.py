@@ -15,6 +15,8 @@ _MOST_GROWTH = 1.0  # MB/h
 _MOST_MEMORY = 400.0  # MB of a process
 _MORE_FILES, _MORE_THREADS = 3, 2  # that come and go
 _MORE_WAITING = 120  # beams: a scan
+_MOST_MATCH_TIME = 100.0  # ms, median
+_CORE = "mapping"  # the process whose scans are counted
 _MOST_LINES = 60  # of one cause in an hour
 _MOST_DISK = 250.0  # MB of logs and saved maps
 _FEWEST = 10  # samples that tell a growth
@@ -27,7 +29,10 @@ _PLACE = re.compile(r'File "[^"]*", line \d+')
 
 @dataclass(frozen=True)
 class Sample:
-    """The graph at one time. hours: simulated ones. wall: s. waiting: beams on their way. disk: MB written."""
+    """The graph at one time. hours: simulated ones. wall: s. waiting: beams on their way. disk: MB written.
+
+    match_time: ms of the wall clock that the newest scan took the solver.
+    """
 
     hours: float
     wall: float
@@ -35,14 +40,20 @@ class Sample:
     waiting: int
     disk: float
     blocks: int
+    scans: int
+    match_time: float
 
     def tell(self, first: "Sample", has_heading: bool = False) -> None:
         """Print it as a line of a table, below a heading."""
         if has_heading:
-            print(f"{'h':>6} {'x real':>6} {'blocks':>6} {'disk':>6}  MB of {', '.join(sorted(self.held))}")
+            columns = f"{'h':>6} {'x real':>6} {'scans':>6} {'ms':>5} {'blocks':>6} {'disk':>6}"
+            print(f"{columns}  MB of {', '.join(sorted(self.held))}")
         speed = 3600.0 * (self.hours - first.hours) / max(self.wall - first.wall, 1e-9)
         memory = " ".join(f"{self.held[name].memory:6.1f}" for name in sorted(self.held))
-        print(f"{self.hours:6.2f} {speed:6.1f} {self.blocks:6d} {self.disk:6.1f}  {memory}", flush=True)
+        print(
+            f"{self.hours:6.2f} {speed:6.1f} {self.scans:6d} {self.match_time:5.0f} {self.blocks:6d} {self.disk:6.1f}"
+            f"  {memory}", flush=True,
+        )  # fmt: skip
 
 
 class JudgedRow(NamedTuple):
@@ -65,12 +76,14 @@ def rows(samples: Sequence[Sample], listener: Listener, printed: str) -> List[Ju
     disk = samples[-1].disk
     return [
         *result,
+        *_of_scans(settled),
         JudgedRow(
             "beams on their way, first and second half",
             " and ".join(f"{one:.0f}" for one in waiting),
             f"<= {_MORE_WAITING} more",
             waiting[1] - waiting[0] <= _MORE_WAITING,
         ),
+        JudgedRow("beams lost on their way", f"{listener.lost}", "0", not listener.lost),
         JudgedRow("logs and maps on disk", f"{disk:.1f} MB", f"<= {_MOST_DISK:.0f} MB", disk <= _MOST_DISK),
         *of_errors(listener.internal_errors(), listener.errors_said, printed),
         *_of_log(listener),
@@ -84,8 +97,7 @@ def _of_process(name: str, samples: Sequence[Sample], settled: Sequence[Sample])
     result = [JudgedRow(f"{name}: memory", f"{memory:.0f} MB", f"<= {_MOST_MEMORY:.0f} MB", memory <= _MOST_MEMORY)]
     if len(settled) < _FEWEST:
         return result
-    hours = np.array([one.hours for one in settled])
-    growth = float(np.polyfit(hours, [one.held[name].memory for one in settled], 1)[0])
+    growth = _growth(name, settled)
     grown = [
         getattr(settled[-1].held[name], each) - getattr(settled[0].held[name], each) for each in ("files", "threads")
     ]
@@ -95,6 +107,28 @@ def _of_process(name: str, samples: Sequence[Sample], settled: Sequence[Sample])
         JudgedRow(f"{name}: more files", f"{grown[0]:+d}", f"<= {_MORE_FILES}", grown[0] <= _MORE_FILES),
         JudgedRow(f"{name}: more threads", f"{grown[1]:+d}", f"<= {_MORE_THREADS}", grown[1] <= _MORE_THREADS),
     ]
+
+
+def _of_scans(settled: Sequence[Sample]) -> Iterator[JudgedRow]:
+    """Yield what a scan cost after the first hour: time of the solver, CPU of its whole way, and memory that stayed."""
+    if len(settled) < _FEWEST or _CORE not in settled[0].held:
+        return
+    first, last = (settled[each] for each in (0, -1))
+    scans = max(last.scans - first.scans, 1)
+    median = float(np.nanmedian([one.match_time for one in settled]))
+    cpu = 1e3 * (last.held[_CORE].cpu - first.held[_CORE].cpu) / scans
+    kept = 1e3 * _growth(_CORE, settled) * (last.hours - first.hours) / scans
+    yield JudgedRow(
+        f"solver, a scan, median to scan {last.scans}", f"{median:.0f} ms", f"<= {_MOST_MATCH_TIME:g} ms",
+        median <= _MOST_MATCH_TIME,
+    )  # fmt: skip
+    yield JudgedRow(f"{_CORE}: CPU of a scan, beams to map", f"{cpu:.0f} ms", "", True)
+    yield JudgedRow(f"{_CORE}: kept of a scan", f"{kept:+.1f} kB", "", True)
+
+
+def _growth(name: str, samples: Sequence[Sample]) -> float:
+    """Return by how much the memory of a process grew, MB/h."""
+    return float(np.polyfit([one.hours for one in samples], [one.held[name].memory for one in samples], 1)[0])
 
 
 def of_errors(counted: Mapping[str, int], said: Sequence[Tuple[str, str]], printed: str) -> Iterator[JudgedRow]:

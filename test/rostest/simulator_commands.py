@@ -85,12 +85,25 @@ class SimulatorCommands(unittest.TestCase):
         last = rospy.Time.now()
         for seconds in (1.0, 0.0):
             echoes.publish(_echoes(last - rospy.Duration(seconds)))
+        held = self._held_time()
+        echoes.publish(_echoes(held))
+        self.truth.wait_for(lambda m: m.header.stamp > held)
+        held = self._held_time()
+        echoes.unregister()  # as if their sender had ended
+        self.truth.wait_for(lambda m: m.header.stamp > held + rospy.Duration(20.0))
+        echoes = rospy.Publisher("sonar/scan/echoes", StampedIntensityCloud, queue_size=10)
+        wait_for_publisher_links(echoes, 1)
+        echoes.publish(_echoes(rospy.Time.now()))
+        self._held_time()
+        echoes.unregister()
+
+    def _held_time(self) -> rospy.Time:
+        """Return the time, which must stand."""
         time.sleep(2.0)  # for messages that are late
         held = rospy.Time.now()
         time.sleep(1.0)  # in which four seconds are simulated while nothing is waited for
         self.assertEqual(rospy.Time.now(), held)
-        echoes.publish(_echoes(held))
-        self.truth.wait_for(lambda m: m.header.stamp > held)
+        return held
 
     def test_it_ends_within_two_seconds_of_ctrl_c(self) -> None:
         """Also when its next moment is five seconds away; another program may take the processor in one attempt."""

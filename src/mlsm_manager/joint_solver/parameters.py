@@ -120,7 +120,7 @@ class SolverParameters(JointSolverParameters):
         0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
     )
     kept_scans: int = parameter(
-        500, "newest scans of which all is kept; of older ones only what a scan may be compared with", low=500,
+        200, "newest scans of which all is kept; of older ones only what a scan may be compared with", low=200,
         high=10**9,
     )  # fmt: skip
     odometry: OdometryModel = field(default_factory=_none_given)

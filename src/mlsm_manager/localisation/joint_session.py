@@ -27,8 +27,8 @@ from node_support.geometry import composed, inverse, transformed, wrapped
 
 _LONGEST_PAUSE = 2.0
 """Usual durations of a scan between two scans: fewer may be a turn that was lost."""
-_MOST_STORED = 500
-"""Scans of a run that are stored with each save: some hours, and some tens of megabytes."""
+_MOST_STORED = 200
+"""Scans of a run that are stored with each save: about an hour, and some megabytes."""
 _MOST_SCANS = 30
 """For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
 _AGREES = 0.5

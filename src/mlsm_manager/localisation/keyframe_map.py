@@ -172,7 +172,7 @@ class KeyframeMap:
         points, origins = placement.heard(cloud)
         self._map.insert(points)
         if self._stretches is not None:
-            self._stretches.add(cloud.end, points, placement)
+            self._stretches.add(cloud.end, points, placement, len(self._map))
         return self._carved(points, cloud.times, origins)
 
     def _draw_what_is_due(self) -> None:

@@ -16,7 +16,9 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from mlsm_manager.surface_map.operations import LevelTransform, moved
 from node_support.geometry import composed, inverse
 
-_MOST = 500  # stretches: of more, the two neighbours with the fewest keyframes make one, so that memory is bounded
+# So many stretches, or so many blocks in all for each block of the map: of more, two neighbours make one.
+_MOST, _MOST_TIMES = 500, 5
+_FEWEST_BLOCKS = 10_000  # are kept at any rate
 
 
 @dataclass(frozen=True)
@@ -56,9 +58,14 @@ class Stretches:
         self._newest: Optional[Tuple[float, np.ndarray]] = None
         self._drawn, self._free = self._none, [self._none]
 
-    def add(self, end: float, points: np.ndarray, placement: Placement) -> None:
-        """Add a keyframe that ends at `end` [s] and settles at points (n, 4) in map."""
+    def add(self, end: float, points: np.ndarray, placement: Placement, in_map: int) -> None:
+        """Add a keyframe that ends at `end` [s] and settles at points (n, 4) in map.
+
+        in_map: number of blocks of the map, to which memory is bounded where the vehicle stays in one place.
+        """
         self._close()
+        while len(self._closed) > _MOST or self.block_count > _FEWEST_BLOCKS + _MOST_TIMES * in_map:
+            self._join_two()
         self._drawn = Blocks.joined([self._drawn, blocks_of(points, self._none.resolution)])
         self._newest = end, placement.path(np.array([end]))[0]
 
@@ -75,13 +82,21 @@ class Stretches:
             return
         self._closed.append(_Stretch(1, *self._newest, _light(self._drawn), _light(Blocks.joined(self._free))))
         self._begin()
-        if len(self._closed) > _MOST:
-            counts = np.array([one.keyframes for one in self._closed])
-            fewest = int(np.argmin(counts[1:] + counts[:-1]))
-            first, second = self._closed[fewest : fewest + 2]
-            drawn, free = (_light(_merged(each)) for each in ((first.drawn, second.drawn), (first.free, second.free)))
-            together = _Stretch(first.keyframes + second.keyframes, first.time, first.pose, drawn, free)
-            self._closed[fewest : fewest + 2] = [together]
+
+    @property
+    def block_count(self) -> int:
+        """How many blocks the closed stretches hold."""
+        return sum(len(one.drawn) for one in self._closed)
+
+    def _join_two(self) -> None:
+        """Join two neighbours with few keyframes and many after them: what bends is mostly the newest path."""
+        counts = np.array([one.keyframes for one in self._closed])
+        since = np.cumsum(counts[::-1])[::-1]
+        fewest = int(np.argmin((counts[1:] + counts[:-1]) / since[1:]))
+        first, second = self._closed[fewest : fewest + 2]
+        drawn, free = (_light(_merged(each)) for each in ((first.drawn, second.drawn), (first.free, second.free)))
+        together = _Stretch(first.keyframes + second.keyframes, first.time, first.pose, drawn, free)
+        self._closed[fewest : fewest + 2] = [together]
 
     def redraw(self, drawn: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, placement: Placement) -> None:
         """Draw both maps, which hold nothing but this run, anew with the stretches where the path is now."""

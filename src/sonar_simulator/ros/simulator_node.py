@@ -3,6 +3,7 @@
 import itertools
 import math
 import threading
+import time
 from typing import Iterator
 
 import numpy as np
@@ -26,7 +27,8 @@ START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still abo
 _WAIT_STEP = 0.05  # s: of the clock while the simulation waits for a listener
 _LISTENER_TIME = 0.5  # s: who subscribes to the beams has told the master its other topics within this time
 _LONGEST_START = 10.0  # s: who is not connected by then has ended
-_LONGEST_WAIT = 10.0  # s: of the wall clock for echoes that are overdue; who needs longer has ended
+_LONGEST_WAIT = 60.0  # s: of the wall clock for echoes that are overdue; who needs longer sends none any more
+_LOOK = 0.5  # s: of the wall clock between two looks whether their sender has ended
 
 
 class Echoes:
@@ -35,18 +37,25 @@ class Echoes:
     def __init__(self) -> None:
         self._interval = UsualInterval()
         self._condition = threading.Condition()
-        rospy.Subscriber(topics.ECHOES, StampedIntensityCloud, self._take, queue_size=10)
+        self._awaited = False
+        self._subscriber = rospy.Subscriber(topics.ECHOES, StampedIntensityCloud, self._take, queue_size=10)
 
     def _take(self, echoes: StampedIntensityCloud) -> None:
         with self._condition:
             self._interval.take(echoes.header.stamp.to_sec())
+            self._awaited = True
             self._condition.notify()
 
     def wait_for(self, stamp: float) -> None:
-        """Wait while echoes are overdue at `stamp` [s]; a sender that stays silent is forgotten."""
+        """Wait while echoes are overdue at `stamp` [s]; not for a sender that has ended or is silent, until it sends.
+
+        On a busy machine one that lives needs long: if time went on without it, it would never catch up.
+        """
+        end = time.monotonic() + _LONGEST_WAIT
         with self._condition:
-            if not self._condition.wait_for(lambda: not self._interval.overdue(stamp), _LONGEST_WAIT):
-                self._interval = UsualInterval()
+            while self._awaited and self._interval.overdue(stamp):
+                if not self._condition.wait(_LOOK):
+                    self._awaited = self._subscriber.get_num_connections() > 0 and time.monotonic() < end
 
 
 class Simulator:

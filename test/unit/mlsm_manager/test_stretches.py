@@ -83,6 +83,19 @@ def test_many_stretches_become_fewer_and_stay_in_the_map(monkeypatch):
     assert_same(made.map.blocks, made_at_once(*(bent.points(patch(number)) for number in range(6))))
 
 
+def test_a_place_that_is_passed_for_hours_takes_no_more_memory_and_the_newest_path_still_bends(monkeypatch):
+    monkeypatch.setattr(stretches, "_FEWEST_BLOCKS", 0)
+    points, own = patch(1).points, Stretches(RESOLUTION)
+    made = KeyframeMap(RESOLUTION, LIMIT, stretches=own)
+    for number in range(60):
+        made.add(MapCloud(points, np.full(len(points), float(number)), float(number)))
+        made.draw(Bent(0.0), EVERYTHING)
+    assert own.block_count <= 5 * len(made.map)
+    made.redraw(Bent(8.0, since=59.0))
+    there = made_at_once(points, Bent(8.0).points(patch(1)))
+    np.testing.assert_array_equal(np.unique(made.map.blocks.cells, axis=0), np.unique(there.cells, axis=0))
+
+
 def beams(number, *echoes):
     points = np.array([[x, y, -2.0, 50.0] for x, y in echoes])
     return MapCloud(points, number + 0.001 * np.arange(len(points)), float(number))
