@@ -5,6 +5,7 @@ import resource
 import shutil
 import signal
 import sys
+import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Sequence
@@ -78,6 +79,7 @@ def _child(sample: Sample, command: List[str], said: Path) -> None:
     """Run a program as its file in nodes/ does, and leave."""
     os.dup2(os.open(str(said), os.O_WRONLY | os.O_CREAT), 2)
     os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
+    tempfile.tempdir = str(said.parent)  # who is ended leaves what it has there
     resource.setrlimit(resource.RLIMIT_AS, (_LIMIT, _LIMIT))
     signal.setitimer(signal.ITIMER_REAL, _ENDLESS_AFTER if sample.may_be_endless else _INTERRUPTED_AFTER)
     signal.signal(signal.SIGALRM, signal.default_int_handler)

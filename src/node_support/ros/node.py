@@ -1,7 +1,7 @@
 """How all nodes start, publish diagnostics, hold little memory, and end: by Ctrl-C or when a new master lacks them."""
 
+import atexit
 import ctypes
-import logging
 import os
 import signal
 import sys
@@ -101,7 +101,8 @@ class _Interrupt:
 def _end(status: int) -> NoReturn:
     """Unregister, run what waits for the shutdown, and end the process with `status`.
 
-    The process ends at once then: rospy's threads would take another half second to notice the shutdown.
+    The process ends at once then: rospy's threads would take another half second to notice the shutdown. What libraries
+    do at the end of a process is done before, so that genpy removes its temporary folder.
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)
@@ -109,7 +110,7 @@ def _end(status: int) -> NoReturn:
     deadline = time.monotonic() + _LONGEST_END
     while not rospy.is_shutdown() and time.monotonic() < deadline:
         time.sleep(_END_STEP)
-    logging.shutdown()
+    atexit._run_exitfuncs()
     sys.stdout.flush()
     sys.stderr.flush()
     os._exit(status)
