@@ -1,5 +1,7 @@
 // The newest revolution of the sonar as operators know it: bow up or north up, range rings, the sweep.
 
+import { line, outlined } from "./pen.js";
+
 const SLOTS = 1024, BINS = 200, RADIUS = 200;
 
 export class SonarView {
@@ -99,12 +101,7 @@ export class SonarView {
     this.drawRings(middle, radius);
     if (this.sweep) {
       const angle = this.sweep[name] - (this.bowUp ? 0 : this.north);
-      context.strokeStyle = colors.sweep;
-      context.lineWidth = 2;
-      context.beginPath();
-      context.moveTo(middle, middle);
-      context.lineTo(middle - radius * Math.sin(angle), middle - radius * Math.cos(angle));
-      context.stroke();
+      line(context, [[middle, middle], [middle - radius * Math.sin(angle), middle - radius * Math.cos(angle)]], colors.sweep, 2);
     }
     this.drawBow(middle);
     this.isDirty = false;
@@ -145,14 +142,7 @@ export class SonarView {
     context.save();
     context.translate(middle, middle);
     if (!this.bowUp && place) context.rotate(place[4] * Math.PI / 180);
-    context.fillStyle = colors.vehicle;
-    context.strokeStyle = colors.halo;
-    context.lineWidth = 2;
-    context.beginPath();
-    [[0, -9], [6, 7], [0, 4], [-6, 7]].forEach((point) => context.lineTo(...point));
-    context.closePath();
-    context.stroke();
-    context.fill();
+    outlined(context, [[0, -9], [6, 7], [0, 4], [-6, 7]], colors.vehicle, colors.halo, 2);
     context.restore();
   }
 }

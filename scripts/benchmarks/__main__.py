@@ -32,6 +32,7 @@ STUDIES = (
     "logs",
     "long_run",
     "no_parameters",
+    "page_link",
     "silence",
     "web",
     "workers",

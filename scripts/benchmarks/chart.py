@@ -9,6 +9,7 @@ from typing import List, Tuple
 import numpy as np
 
 from benchmarks.harness import Row, benchmark_parser, missing_row, print_table, recorded
+from georeferencing.adjustment import Adjusted
 from georeferencing.asked import AskedOrigin
 from georeferencing.fixes import Fix
 from georeferencing.origin import Origin
@@ -17,7 +18,6 @@ from mlsm_manager.offline.charts import origin_of_fixes
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import Truth, read_recording
 from mlsm_manager.offline.run_files import position_error, positions_at
-from node_support.geometry import rotated
 
 _RECORDING = "marina_first.bag"
 _PLACE = Origin(42.2, 3.1)  # where the truth's zero is put: the bag does not tell, and errors do not depend on it
@@ -51,7 +51,7 @@ def _figures(mapped: MappedBag, truth: Truth, chosen: np.ndarray, asked: AskedOr
     places = _PLACE.degrees(truth.positions)
     fixes = [Fix(time, *place, (_DEVIATION, _DEVIATION)) for time, place in zip(truth.times[chosen], places[chosen])]
     found = origin_of_fixes(run, fixes, asked)
-    errors, covariances = _errors(mapped, truth, found.origin)
+    errors, covariances = _errors(mapped, truth, found)
     distances = np.hypot(*errors.T)
     squares = np.einsum("ni,nij,nj->n", errors, np.linalg.inv(covariances), errors)
     stated = np.sqrt(np.trace(covariances, axis1=1, axis2=2).mean())
@@ -63,19 +63,15 @@ def _figures(mapped: MappedBag, truth: Truth, chosen: np.ndarray, asked: AskedOr
     )
 
 
-def _errors(mapped: MappedBag, truth: Truth, origin: Origin) -> Tuple[np.ndarray, np.ndarray]:
+def _errors(mapped: MappedBag, truth: Truth, found: Adjusted) -> Tuple[np.ndarray, np.ndarray]:
     """Return how far (n, 2) the path on the chart lies from the truth, east and north [m], with stated covariances."""
     run, trust = mapped.run, mapped.run.trust
     known = (truth.times >= run.times[0]) & (truth.times <= run.times[-1])
     times = truth.times[known]
     path = positions_at(run.times, run.best, times)
-    errors = _PLACE.points(origin.degrees(path)) - truth.positions[known]
-    of_path = np.empty((len(times), 2, 2))
-    for row in range(2):
-        for column in range(2):
-            of_path[:, row, column] = np.interp(times, trust.times, trust.covariances[:, row, column])
-    turn = np.array([rotated(axis, np.array(origin.yaw)) for axis in np.eye(2)]).T
-    return errors, turn @ of_path @ turn.T + origin.covariances(path)
+    errors = _PLACE.points(found.origin.degrees(path)) - truth.positions[known]
+    variances = np.interp(times, trust.times, trust.deviations**2 / 2.0)
+    return errors, found.covariances(path, variances)
 
 
 def main() -> None:

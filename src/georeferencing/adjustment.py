@@ -1,7 +1,8 @@
 """Where fixes put the map: offset and azimuth by weighted least squares, with what the compass or a map file knows.
 
 The errors of a receiver last for minutes, so that many fixes of one minute tell little more than one; those of the path
-grow as in a random walk. Both are in the covariance of how far fixes and path lie apart.
+grow as in a random walk, so that what the path is off at a fix it mostly is off beside it too, and the fix takes that
+away. Both are in the covariance of how far fixes and path lie apart.
 """
 
 from typing import NamedTuple, Tuple
@@ -27,13 +28,28 @@ _CONTRADICTS = 3.0  # deviations
 
 class Adjusted(NamedTuple):
     """origin: with its covariance. used: number of fixes. outliers: number of those that lie apart from the others.
-    note: what else is to be said, empty where there is nothing.
+    note: what else is to be said, empty where there is nothing. gains: (3, 2, n), by which the origin follows n fixes,
+    east and north; variances: (n,) m^2, of each coordinate of the path at these.
     """
 
     origin: Origin
-    used: int
-    outliers: int
+    used: int = 0
+    outliers: int = 0
     note: str = ""
+    gains: np.ndarray = np.zeros((3, 2, 0))
+    variances: np.ndarray = np.zeros(0)
+
+    def covariances(self, places: np.ndarray, variances: np.ndarray) -> np.ndarray:
+        """Return how well the path is known on the Earth: (k, 2, 2) m^2, east and north.
+
+        places: (k, >= 2) x y [m] of it in map. variances: (k,) m^2, of each coordinate of these in map.
+        """
+        jacobian = self.origin.jacobian(places)
+        alike = np.minimum.outer(variances, self.variances)
+        shared = jacobian @ np.einsum("pan,kn->kpa", self.gains, alike)
+        of_path = variances[:, np.newaxis, np.newaxis] * np.eye(2)
+        of_origin = jacobian @ self.origin.covariance @ jacobian.transpose(0, 2, 1)
+        return of_path + of_origin - shared - shared.transpose(0, 2, 1)
 
 
 def of_compass(fixes: PlacedFixes, azimuth_deg: float, deviation: float = COMPASS_DEVIATION) -> Origin:
@@ -70,10 +86,11 @@ def _adjusted(fixes: PlacedFixes, known: Origin) -> Adjusted:
     scale = max(float(np.median(squares)) / _MIDDLE, 1.0)
     inliers = np.flatnonzero(squares <= _FARTHEST * scale)
     chosen = inliers[np.unique(np.linspace(0, len(inliers) - 1, _MOST_FIXES).astype(int))]
-    pose, covariance = _least_squares(fixes.take(chosen), there[chosen], pose, scale, known)
+    pose, covariance, gains = _least_squares(fixes.take(chosen), there[chosen], pose, scale, known)
     place = Origin(known.latitude_deg, known.longitude_deg).degrees(pose[np.newaxis, :2])[0]
     azimuth = float(EAST_DEG - np.degrees(wrapped(pose[2])))
-    return Adjusted(Origin(*place, azimuth, covariance), len(inliers), len(fixes) - len(inliers))
+    origin, outliers = Origin(*place, azimuth, covariance), len(fixes) - len(inliers)
+    return Adjusted(origin, len(inliers), outliers, "", gains, fixes.variances[chosen])
 
 
 def _robust(fixes: PlacedFixes, there: np.ndarray, yaw: float, variance: float) -> Tuple[float, np.ndarray, np.ndarray]:
@@ -98,25 +115,22 @@ def _robust(fixes: PlacedFixes, there: np.ndarray, yaw: float, variance: float) 
 
 def _least_squares(
     fixes: PlacedFixes, there: np.ndarray, pose: np.ndarray, scale: float, known: Origin
-) -> Tuple[np.ndarray, np.ndarray]:
-    """Return pose (3,) and covariance (3, 3) with the errors' correlation and what is known before."""
+) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return pose (3,), covariance (3, 3) and gains (3, 2, n) with the errors' correlation and what is known before."""
     apart = np.abs(fixes.times[:, np.newaxis] - fixes.times)
     lasting = _LASTING * np.exp(-apart / _CORRELATION_TIME) + (1.0 - _LASTING) * np.eye(len(fixes))
-    grown = np.maximum.accumulate(fixes.variances)
-    walked = np.minimum(grown[:, np.newaxis], grown)
+    walked = np.minimum.outer(fixes.variances, fixes.variances)
     factors = [cho_factor(scale * np.outer(axis, axis) * lasting + walked) for axis in fixes.deviations.T]
     before, expected = np.linalg.inv(known.covariance), np.array([0.0, 0.0, known.yaw])
     for _ in range(_ROUNDS):
         residuals, jacobian = _residuals(fixes, there, pose)
         ahead = expected - pose
         ahead[2] = wrapped(ahead[2])
-        information, pull = before.copy(), before @ ahead
-        for axis, factor in enumerate(factors):
-            weighted = cho_solve(factor, jacobian[:, axis])
-            information += jacobian[:, axis].T @ weighted
-            pull += weighted.T @ residuals[:, axis]
-        pose = pose + np.linalg.solve(information, pull)
-    return pose, np.linalg.inv(information)
+        weighted = np.stack([cho_solve(factor, jacobian[:, axis]) for axis, factor in enumerate(factors)], axis=1)
+        covariance = np.linalg.inv(before + np.einsum("nak,nal->kl", jacobian, weighted))
+        pull = before @ ahead + np.einsum("nak,na->k", weighted, residuals)
+        pose = pose + covariance @ pull
+    return pose, covariance, np.einsum("kl,nal->kan", covariance, weighted)
 
 
 def _residuals(fixes: PlacedFixes, there: np.ndarray, pose: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

@@ -4,7 +4,7 @@ from typing import List, Optional
 
 import numpy as np
 
-from georeferencing.adjustment import adjusted
+from georeferencing.adjustment import Adjusted, adjusted
 from georeferencing.asked import AskedOrigin
 from georeferencing.fixes import Fix, PlacedFixes
 from georeferencing.origin import Origin
@@ -21,8 +21,8 @@ class LiveOrigin:
         self._fixes: List[Fix] = []
         self._places: List[np.ndarray] = []
 
-    def take(self, fix: Fix, place: np.ndarray, variance: float) -> Origin:
-        """Return the origin with one more fix at `place` (2,) [m] in map, each coordinate of which has `variance`.
+    def take(self, fix: Fix, place: np.ndarray, variance: float) -> Adjusted:
+        """Return the origin, adjusted to one more fix at `place` (2,) [m] in map, whose coordinates have `variance`.
 
         Raises RefusedInput where the declination is asked for and not known.
         """
@@ -32,4 +32,4 @@ class LiveOrigin:
             self._fixes, self._places = self._fixes[::2], self._places[::2]
         placed = np.array(self._places)
         fixes = PlacedFixes.of(self._fixes, placed[:, :2], placed[:, 2])
-        return adjusted(fixes, self._known or self._asked.before(fixes)).origin
+        return adjusted(fixes, self._known or self._asked.before(fixes))

@@ -73,13 +73,13 @@ class Origin:
         east_north = np.column_stack(_projection(self.plane)(longitude, latitude))
         return rotated(east_north, np.array(-self.yaw))
 
-    def covariances(self, points: np.ndarray) -> np.ndarray:
-        """Return how well the places of points (n, >= 2) of the map are known: (n, 2, 2) m^2, east and north."""
+    def jacobian(self, points: np.ndarray) -> np.ndarray:
+        """Return how the places of points (n, >= 2) of the map move, east and north, with the origin: (n, 2, 3)."""
         east, north = self._east_north(points).T
         jacobian = np.zeros((len(east), 2, 3))
         jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
         jacobian[:, :, 2] = np.column_stack([-north, east])
-        return jacobian @ self.covariance @ jacobian.transpose(0, 2, 1)
+        return jacobian
 
     def _east_north(self, points: np.ndarray) -> np.ndarray:
         return rotated(np.asarray(points, dtype=np.float64)[:, :2], np.array(self.yaw))

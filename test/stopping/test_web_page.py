@@ -4,6 +4,9 @@ import json
 import subprocess
 import sys
 import time
+from functools import partial
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+from threading import Thread
 from urllib.request import urlopen
 
 import numpy as np
@@ -167,3 +170,17 @@ def test_7_it_survives_a_restarted_master(site):
     site.start_nodes()
     site.wait(f"page.model.run !== '{before}' && page.model.tiles.size && page.model.now?.waiting === ''")
     assert site.errors() == []
+
+
+def test_8_it_works_in_a_frame_of_another_host_as_in_cockpit(site, tmp_path):
+    frame = f"<iframe src='http://127.0.0.1:{site.port}/?widget=1' width=480 height=360></iframe>"
+    (tmp_path / "index.html").write_text(frame)
+    other = ThreadingHTTPServer(("127.0.0.1", 0), partial(SimpleHTTPRequestHandler, directory=str(tmp_path)))
+    Thread(target=other.serve_forever, daemon=True).start()
+    site.browser.get(f"http://localhost:{other.server_port}/")
+    site.browser.switch_to.frame(0)
+    site.wait("window.page && page.model.tiles.size && page.model.now?.waiting === ''")
+    seen = "getComputedStyle(document.querySelector('{}')).display !== 'none'"
+    assert site.run(f"return {seen.format('#map')} && !({seen.format('aside')})")
+    assert [line for line in site.errors() if "favicon" not in line] == []
+    other.shutdown()

@@ -10,6 +10,7 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 from tqdm import tqdm
 
+from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
 from mlsm_manager.odometry.mending import mended
@@ -42,7 +43,7 @@ class MappedBag:
     """What was made of a recording and of those added to its map.
 
     odometry: how the vehicle knows its motion. parameters: those of the run, with the calibration that was found.
-    refined and findings are None where nothing was refined, or no solver ran.
+    refined and findings are None where nothing was refined, or no solver ran; charted where no origin was asked for.
     """
 
     title: str
@@ -54,6 +55,7 @@ class MappedBag:
     findings: Optional[Findings]
     sessions: List[Session]
     run: Run
+    charted: Optional[Adjusted] = None
 
     @property
     def solution(self) -> Optional[Solution]:

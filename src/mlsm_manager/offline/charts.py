@@ -64,12 +64,12 @@ def with_origin(mapped: MappedBag, options: Namespace) -> MappedBag:
             files = [options.bags[0], *([options.vehicle] if options.vehicle else [])]
             found = origin_of_fixes(mapped.run, [fix for file in files for fix in satellite_fixes(file)], asked)
         else:
-            found = Adjusted(asked.origin(float(mapped.run.times[0])), 0, 0)
+            found = Adjusted(asked.origin(float(mapped.run.times[0])))
     except RefusedInput as refused:
         raise RecordingError(f"--origin: {refused}") from refused
     stored = replace(mapped.run.stored, arrays={**mapped.run.stored.arrays, STORED: found.origin.array})
     counts = {**mapped.run.counts, "origin": _to_mapping(found)}
-    return replace(mapped, run=replace(mapped.run, stored=stored, counts=counts))
+    return replace(mapped, run=replace(mapped.run, stored=stored, counts=counts), charted=found)
 
 
 def origin_of_fixes(run: Run, fixes: Sequence[Fix], asked: AskedOrigin) -> Adjusted:

@@ -6,6 +6,7 @@ from typing import Any, Dict, List
 
 import numpy as np
 
+from georeferencing.adjustment import Adjusted
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.charts import CHART_FILES
@@ -136,7 +137,8 @@ def _accuracy(mapped: MappedBag) -> str:
     if origin is None or not origin.covariance.any():
         return told
     places = positions_at(run.times, run.best, trust.times)
-    both = np.trace(trust.covariances + origin.covariances(places), axis1=1, axis2=2)
+    charted = mapped.charted or Adjusted(origin)
+    both = np.trace(charted.covariances(places, trust.deviations**2 / 2.0), axis1=1, axis2=2)
     return f"{told}, within {WITHIN * np.sqrt(both.max()):.1f} m on the Earth"
 
 

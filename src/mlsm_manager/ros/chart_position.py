@@ -7,6 +7,7 @@ import rospy
 from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Float64MultiArray
 
+from georeferencing.adjustment import Adjusted
 from georeferencing.asked import AskedOrigin
 from georeferencing.fixes import fix_of
 from georeferencing.live import LiveOrigin
@@ -16,7 +17,7 @@ from mlsm_manager.localisation.place_now import PlaceNow, PositionState
 from mlsm_manager.ros.odometry_track import OdometryTrack
 from mlsm_manager.scan_matching.scan_path import POSITION
 from node_support import topics
-from node_support.geometry import composed, rotated
+from node_support.geometry import composed
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
 from sonar_processing.ros.conversions import header
@@ -39,7 +40,7 @@ class ChartPosition:
         self._asked, self._localiser, self._odometry = asked, localiser, odometry
         self._base_frame, self._health = base_frame, health
         self._live: Optional[LiveOrigin] = None
-        self._own: Optional[Origin] = None
+        self._own: Optional[Adjusted] = None
         self._told: Optional[Origin] = None
         self._origins = rospy.Publisher(topics.MAP_ORIGIN, Float64MultiArray, queue_size=1, latch=True)
         self._position = rospy.Publisher(topics.CHART_POSITION, NavSatFix, queue_size=2)
@@ -67,9 +68,8 @@ class ChartPosition:
         message.latitude, message.longitude = origin.degrees(pose[np.newaxis])[0].tolist()
         message.altitude = np.nan
         covariance = np.diag(np.full(3, _UNKNOWN_VARIANCE))
-        turn = np.array([rotated(axis, np.array(origin.yaw)) for axis in np.eye(2)]).T
-        of_map = turn @ place.covariance[POSITION, POSITION] @ turn.T
-        covariance[:2, :2] = of_map + origin.covariances(pose[np.newaxis])[0]
+        own = self._own if self._own is not None and self._own.origin is origin else Adjusted(origin)
+        covariance[:2, :2] = own.covariances(pose[np.newaxis], np.array([_variance(place)]))[0]
         message.position_covariance = covariance.ravel().tolist()
         message.position_covariance_type = NavSatFix.COVARIANCE_TYPE_KNOWN
         self._position.publish(message)
@@ -79,9 +79,15 @@ class ChartPosition:
         self._health.count("satellite fixes")
         odometry = self._odometry.track(fix.time, np.empty(0), fix.time).poses[-1]
         place = self._localiser.place_now(fix.time, odometry)
-        variance = 0.0 if place is None else float(np.trace(place.covariance[POSITION, POSITION])) / 2.0
-        if self._live is None or self._localiser.origin is not self._own:
+        variance = 0.0 if place is None else _variance(place)
+        if self._live is None or self._own is None or self._localiser.origin is not self._own.origin:
             # A new map, or one that was loaded.
             self._live = LiveOrigin(self._asked, self._localiser.origin)
         pose = composed(self._localiser.last_correction, odometry)
-        self._own = self._localiser.origin = self._live.take(fix, pose[:2], variance)
+        self._own = self._live.take(fix, pose[:2], variance)
+        self._localiser.origin = self._own.origin
+
+
+def _variance(place: PlaceNow) -> float:
+    """Return that of each coordinate of a place, m^2."""
+    return float(np.trace(place.covariance[POSITION, POSITION])) / 2.0

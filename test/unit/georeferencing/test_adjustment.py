@@ -60,17 +60,30 @@ def test_exact_fixes_put_the_map_where_it_is():
 
 
 @pytest.mark.parametrize("azimuth_is_known", [True, False])
-def test_the_stated_accuracy_is_true(azimuth_is_known):
-    """Over many receivers and compasses the squared error, in stated variances, is 1 in the mean for each axis."""
-    place, squares = np.array([100.0, 100.0]), []
+@pytest.mark.parametrize("walked", [0.0, 3.0])
+def test_the_stated_accuracy_is_true_all_along_the_path(azimuth_is_known, walked):
+    """Over many receivers, compasses and paths the squared error, in stated variances, is 1 in the mean for each axis.
+
+    walked: by how much the path errs in the end, m; as a random walk does.
+    """
+    squares, everywhere = [], np.arange(0.0, 1260.0, 30.0)
+    times = np.union1d(TWICE, everywhere)
+    variances = walked**2 * times / times[-1]
+    rows, fixed = np.searchsorted(times, everywhere), np.searchsorted(times, TWICE)
     for seed in range(60):
-        error = np.degrees(COMPASS_DEVIATION) * np.random.default_rng(seed).normal()
-        fixes = fixes_with(lasting(seed))
+        generator = np.random.default_rng(seed)
+        error, steps = np.degrees(COMPASS_DEVIATION) * generator.normal(), generator.normal(size=(len(times), 2))
+        path = path_at(times) + np.cumsum(np.sqrt(np.diff(variances, prepend=0.0))[:, np.newaxis] * steps, axis=0)
+        degrees = fixes_with(lasting(seed)).degrees
+        fixes = PlacedFixes(TWICE, degrees, np.ones((len(TWICE), 2)), path[fixed], variances[fixed])
         known = of_compass(fixes, TRUTH.azimuth_deg + error, COMPASS_DEVIATION if azimuth_is_known else np.inf)
-        origin = adjusted(fixes, known).origin
-        off = apart(origin, place)
-        squares.append(off @ np.linalg.inv(origin.covariances(place[np.newaxis])[0]) @ off / 2.0)
-    assert 0.6 < np.mean(squares) < 1.4
+        found = adjusted(fixes, known)
+        off = rotated(TRUTH.points(found.origin.degrees(path[rows])) - path_at(everywhere), np.array(TRUTH.yaw))
+        stated = found.covariances(path[rows], variances[rows])
+        squares.append(np.einsum("ka,kab,kb->k", off, np.linalg.inv(stated), off) / 2.0)
+    means = np.mean(squares, axis=0)
+    assert 0.7 < means.mean() < 1.3
+    assert 0.5 < means.min() < means.max() < 1.8
 
 
 def test_many_fixes_of_one_minute_tell_little_more_than_one():
@@ -124,7 +137,7 @@ def test_a_map_that_knows_its_place_is_moved_by_new_fixes_as_far_as_they_tell_mo
     known = Origin(TRUTH.latitude_deg, TRUTH.longitude_deg, TRUTH.azimuth_deg, np.diag([0.1, 0.1, 1e-4]))
     live = LiveOrigin(AskedOrigin(None), known)
     off = TRUTH.degrees(np.array([[30.0, 0.0]]))[0]
-    origin = live.take(Fix(0.0, *off, (10.0, 10.0)), np.zeros(2), 0.0)
+    origin = live.take(Fix(0.0, *off, (10.0, 10.0)), np.zeros(2), 0.0).origin
     assert np.hypot(*apart(origin, [0.0, 0.0])) < 0.1
 
 
@@ -133,7 +146,7 @@ def test_live_and_offline_find_the_same():
     fixes = fixes_with(errors)
     live = LiveOrigin(AskedOrigin(None, TRUTH.azimuth_deg))
     for time, degrees, place in zip(fixes.times, fixes.degrees, fixes.places):
-        origin = live.take(Fix(time, *degrees, (1.0, 1.0)), place, 0.0)
+        origin = live.take(Fix(time, *degrees, (1.0, 1.0)), place, 0.0).origin
     np.testing.assert_allclose(origin.array, adjusted(fixes, compass(fixes)).origin.array, rtol=1e-6)
 
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from georeferencing.adjustment import Adjusted
 from georeferencing.asked import AskedOrigin
 from georeferencing.chart_files import ChartedPath, geojson, kml
 from georeferencing.declination import declination_deg
@@ -85,7 +86,7 @@ def test_distances_on_the_chart_are_those_in_the_map(latitude, longitude, azimut
 
 def test_a_turned_map_is_less_certain_far_from_its_origin():
     origin = Origin(41.2, 3.1, 90.0, np.diag([1.0, 4.0, 0.01**2]))
-    near, far = origin.covariances(np.array([[0.0, 0.0], [300.0, 0.0]]))
+    near, far = Adjusted(origin).covariances(np.array([[0.0, 0.0], [300.0, 0.0]]), np.zeros(2))
     np.testing.assert_allclose(near, np.diag([1.0, 4.0]))
     np.testing.assert_allclose(far, np.diag([1.0, 13.0]))
 
