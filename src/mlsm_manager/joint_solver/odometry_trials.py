@@ -1,7 +1,7 @@
 """Fits of a run that believe its odometry less, or another one."""
 
 from dataclasses import dataclass, replace
-from typing import Optional
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -9,6 +9,7 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.scan_matching.scan import Track
 
@@ -43,13 +44,29 @@ def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     return OdometryErrors(run.log.node_times.copy(), reported[:, YAW], nodes[:, YAW], scales, places)
 
 
-def fit_with(run: Solution, track: Track) -> BatchResult:
-    """Return the fit of a run, from where it is, if its odometry had reported `track`."""
+def fit_with(run: Solution, track: Track, reckoned: Optional[Tuple[float, float]] = None) -> BatchResult:
+    """Return the fit of a run, from where it is, if its odometry had reported `track`.
+
+    reckoned: s, begin and end of a stretch whose path the fit begins with as `track` says; None where there is none.
+    """
     log = run.log.since(0, OdometryLog.of(track))
     nodes = run.state.nodes.copy()
     numbers = np.arange(len(nodes))
     nodes[:, : YAW + 1] += run.log.node_poses(numbers) - log.node_poses(numbers)
+    if reckoned is not None:
+        nodes = _reckoned(run, log, nodes, reckoned)
     return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
+
+
+def _reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float, float]) -> np.ndarray:
+    """Return the nodes with those of a stretch where `log` leads, and the later ones moved along."""
+    result = nodes.copy()
+    first, last = np.searchsorted(log.node_times, stretch)
+    for node in range(max(first, 1), min(last + 1, len(nodes))):
+        motion = log.node_motion(np.array([node - 1, node]))
+        result[node, :YAW] = run.odometry.advanced(result[node - 1 : node], motion[:1], motion[1:])[0, :YAW]
+        result[node + 1 :, :YAW] = nodes[node + 1 :, :YAW] + result[node, :YAW] - nodes[node, :YAW]
+    return result
 
 
 def _for_model(state: State, model: OdometryModel) -> State:

@@ -24,9 +24,11 @@ class FaultKind(Enum):
     CIRCLE = "the compass errs by the heading"
     LENGTH = "all reported distances are wrong"
     DISTANCES = "reported distances changed"
+    CARRIED = "a current carried the vehicle, and the odometry did not feel it"
 
 
 _OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
+_OF_PAIRS = (FaultKind.SLIP, FaultKind.CARRIED)  # that pairs of scans show
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 
 
@@ -34,13 +36,14 @@ _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 class MotionFault:
     """begin: s, of a drift, a step or a change; NaN where it holds all along.
 
-    sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; or the
-    logarithm of a factor.
+    sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; the
+    logarithm of a factor; or x y [m/s] in odom. end: s, of a current.
     """
 
     kind: FaultKind
     begin: float
     sizes: Tuple[float, ...]
+    end: float = np.inf
 
     def times(self, factor: float) -> "MotionFault":
         """Return one that is so many times as large."""
@@ -55,11 +58,16 @@ class MotionFault:
         if self.kind is FaultKind.DRIFT:
             return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
         if self.kind in (FaultKind.STEP, FaultKind.SLIP):
-            return slip_text(self.sizes[0])
+            return f"the head slipped by {abs(np.degrees(self.sizes[0])):.0f} deg, or the compass stepped,"
+        if self.kind is FaultKind.CARRIED:
+            way, seconds = size * (self.end - self.begin), self.end - self.begin
+            return f"the vehicle was carried by {way:.0f} m in {seconds:.0f} s, which the odometry did not feel,"
         return f"the compass errs by up to {np.degrees(size):.0f} deg by the heading: iron beside it"
 
     def is_beyond(self, end: float) -> bool:
         """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
+        if self.kind is FaultKind.CARRIED:
+            return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind is FaultKind.DRIFT else 1.0)
         return size > (_USUAL_LENGTH if self.kind in _OF_DISTANCES else _USUAL_HEADING)
 
@@ -68,6 +76,9 @@ class MotionFault:
 
         After a slip of the head the heading is that of the sonar.
         """
+        if self.kind is FaultKind.CARRIED:
+            since = np.clip(track.times - self.begin, 0.0, self.end - self.begin)
+            return Track(track.times, track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
         steps = composed(inverse(track.poses[:-1]), track.poses[1:])
         errors = _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
         if self.kind in _OF_DISTANCES:
@@ -78,11 +89,6 @@ class MotionFault:
             return Track(track.times, np.column_stack([track.poses[:, :2], yaws]))
         steps[:, 2] = np.diff(yaws)
         return Track(track.times, integrated(np.append(track.poses[0, :2], yaws[0]), steps))
-
-
-def slip_text(turn: float) -> str:
-    """Return what a turn [rad] means that the head made, or the heading, and that neither told."""
-    return f"the head slipped by {abs(np.degrees(turn)):.0f} deg, or the compass stepped,"
 
 
 def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -116,6 +122,8 @@ def likely_faults(times: np.ndarray, yaws: np.ndarray, headings: np.ndarray, sca
     """
     logs, found = np.log1p(np.maximum(scales, -0.9)), []
     for kind in FaultKind:
+        if kind in _OF_PAIRS:
+            continue
         values = logs if kind in _OF_DISTANCES else headings
         tried = [_explained(kind, times, yaws, values, float(begin)) for begin in _begins(times, kind)]
         found.append(min(tried, key=lambda one: one[0])[1])

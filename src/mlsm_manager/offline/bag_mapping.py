@@ -78,20 +78,22 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     _warn_of_z_down(signs, options)
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
+    of_echoes = [*mounted, *echo_findings(scans, recording.sonar_in_base, replayed.corrections).causes]
     refined, refitted = None, []
     if options.refine:
         with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
             settings = parameters.map_settings()
-            refined = refine(recording.track, replayed.scans, replayed.hypotheses, settings, bar.update)
+            suspected = [cause.fault for cause in of_echoes if cause.fault is not None]
+            refined = refine(replayed, recording.track, settings, suspected, bar.update)
     if options.check:
         with _bar(REFITS, "fit", "check") as bar:
             refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    of_echoes = [*mounted, *echo_findings(scans, recording.sonar_in_base, replayed.corrections).causes]
-    of_motion = [] if refined is None or of_echoes else refined.motion.causes
+    if refined is not None:
+        of_echoes = refined.motion.told_with(of_echoes)
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
-    causes = ranked([*causes, *of_echoes, *of_beams, *of_motion])
+    causes = ranked([*causes, *of_echoes, *of_beams])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))

@@ -1,7 +1,7 @@
 """What the echoes of a whole run say against its odometry, and the run with that mended."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, NamedTuple
+from typing import List, NamedTuple, Sequence
 
 import numpy as np
 
@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.odometry.faults import MotionFault, likely_faults
+from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.course import course_causes, course_of
@@ -53,6 +53,15 @@ class MotionFindings:
         aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
         return replace(self, causes=[*self.causes, *course_causes(course)], apart=[*self.apart, aside])
 
+    def told_with(self, of_echoes: Sequence[Cause]) -> List[Cause]:
+        """Return the causes with those that pairs of scans show: those that the fit mends it tells better.
+
+        A wrong mount or wrong stamps explain what the fit finds wrong with the odometry.
+        """
+        if any(cause.fault is None for cause in of_echoes):
+            return list(of_echoes)
+        return self.causes if self.causes else list(of_echoes)
+
     def placed(self, scan: Scan, reported: Track) -> Scan:
         """Return a scan that was placed by `reported` as this odometry places it."""
         if self.track is reported:
@@ -67,11 +76,14 @@ class _Trial(NamedTuple):
     fit: BatchResult
 
 
-def motion_findings(run: Solution, fit: BatchResult, track: Track) -> MotionFindings:
+def motion_findings(
+    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[MotionFault] = ()
+) -> MotionFindings:  # fmt: skip
     """Return what speaks against the odometry `track` of a run that is fitted as `fit` says, and the run without it.
 
     Each fault is taken out of the odometry and the run fitted again; the one with which echoes agree best is named.
-    What a fit finds besides that lets the odometry err makes the position uncertain.
+    What a fit finds besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of
+    scans show.
     """
     found = MotionFindings(run, fit, track)
     if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST:
@@ -82,13 +94,14 @@ def motion_findings(run: Solution, fit: BatchResult, track: Track) -> MotionFind
         if errors is None:
             return found
         places = errors.places
-        if len(found.causes) == _FAULTS or not _errs(errors):
+        if len(found.causes) == _FAULTS or not (_errs(errors) or suspected):
             break
-        best = _best(found, errors)
+        best = _best(found, [*_likely(errors), *suspected])
         gain = best.fit.log_likelihood - found.fit.log_likelihood
         if gain < _NATS or not best.fault.is_beyond(errors.times[-1]):
             break
         found = _without(found, best, gain)
+        suspected = [fault for fault in suspected if fault.kind is not best.fault.kind]
     others = [places, first] if found.causes else [places] if _errs(errors) else []
     return replace(found, apart=[other - _places(found.run) for other in others])
 
@@ -102,15 +115,19 @@ def _errs(errors: OdometryErrors) -> bool:
     return bool(errors.headings.std() > _HEADING or scales.std() > _SCALE or abs(scales.mean()) > _LENGTH)
 
 
-def _best(found: MotionFindings, errors: OdometryErrors) -> _Trial:
-    faults = likely_faults(errors.times, errors.yaws, errors.headings, errors.scales)
+def _likely(errors: OdometryErrors) -> List[MotionFault]:
+    return likely_faults(errors.times, errors.yaws, errors.headings, errors.scales) if _errs(errors) else []
+
+
+def _best(found: MotionFindings, faults: Sequence[MotionFault]) -> _Trial:
     best = max((_tried(found, fault) for fault in faults), key=_likelihood)
     return max([best, *(_tried(found, best.fault.times(factor)) for factor in _LARGER)], key=_likelihood)
 
 
 def _tried(found: MotionFindings, fault: MotionFault) -> _Trial:
     track = fault.mended(found.track)
-    return _Trial(fault, track, fit_with(found.run, track))
+    span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
+    return _Trial(fault, track, fit_with(found.run, track, span))
 
 
 def _likelihood(trial: _Trial) -> float:
@@ -120,5 +137,5 @@ def _likelihood(trial: _Trial) -> float:
 def _without(found: MotionFindings, trial: _Trial, gain: float) -> MotionFindings:
     log = found.run.log.since(0, OdometryLog.of(trial.track))
     run = replace(found.run, log=log, state=trial.fit.state)
-    cause = Cause(trial.fault.text, gain, trial.fault.begin)
+    cause = Cause(trial.fault.text, gain, trial.fault.begin, fault=trial.fault)
     return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

@@ -14,8 +14,10 @@ from mlsm_manager.joint_solver.solution import Solution, solved_path
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
+from mlsm_manager.odometry.faults import MotionFault
 from mlsm_manager.offline.motion_findings import MotionFindings, motion_findings
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.offline.replay import Replayed
+from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
@@ -58,12 +60,15 @@ def parts_of_refining(hypotheses: Hypotheses) -> int:
 
 
 def refine(
-    track: Track, scans: Sequence[Scan], hypotheses: Hypotheses, settings: MapSettings, done: Done = lambda: None
-) -> Refined:
-    """Return the run of all `scans` that the solvers have taken, fitted at once; live runs are where fits begin.
+    replayed: Replayed, track: Track, settings: MapSettings, suspected: Sequence[MotionFault] = (),
+    done: Done = lambda: None,
+) -> Refined:  # fmt: skip
+    """Return the run of all scans that the solvers have taken, fitted at once; live runs are where fits begin.
 
-    Of several odometries the likelier one is believed from then on.
+    Of several odometries the likelier one is believed from then on. suspected: what pairs of scans say is wrong with
+    the odometry `track`.
     """
+    hypotheses = replayed.hypotheses
     fits = []
     for solver in hypotheses.solvers:
         fits.append(fitted(solver))
@@ -71,10 +76,10 @@ def refine(
     best, solver = hypotheses.believed(fits), hypotheses.shown
     closing = with_loops_closed(solver, best)
     done()
-    motion = motion_findings(solver.solution.with_state(closing.batch.state), closing.batch, track)
+    motion = motion_findings(solver.solution.with_state(closing.batch.state), closing.batch, track, suspected)
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
-    for scan in scans:
+    for scan in replayed.scans:
         surfaces.add(MapCloud.of_scan(motion.placed(scan, track)))
     surfaces.settle(motion.run)
     whole, batch = OdometryLog.of(motion.track), motion.fit

@@ -18,6 +18,9 @@ _SIDE = 60.0  # s before and after a change that are compared: some turns of the
 _PARTS = np.array([-1.0, -0.6, -0.2, 0.0, 0.2, 0.6, 1.0])  # of these: all parts of a side must say the same
 _FEWEST = 10  # beams in a part
 _CHANGED, _STEADY = 1.5, 1.15  # times: by more a setting changed, by less the parts of a side differ
+_SAMPLE = 400  # beams that tell whether echoes come twice
+_RATIOS = np.array([2.0, 1.5, 1.6, 1.7, 1.8, 1.9, 2.1, 2.2, 2.3, 2.5])  # of ranges: twice, and others by chance
+_NEAREST = 1.0 / 3.0  # of the range, from which on echoes are compared with those nearer
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle, which nothing corrects while the head stands
 
 
@@ -31,7 +34,7 @@ def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
     if stands:
         return stands
     hears = np.array([bool(one.beam.intensities.any()) for one in beams])
-    found = [_stuck(times, beams), _blind(angles, hears)]
+    found = [_stuck(times, beams), _blind(angles, hears), _doubled(beams)]
     for text, measure in _MEASURES:
         values = np.array([measure(one) for one, heard in zip(beams, hears) if heard])
         found.append(_changed(times[hears], values, text))
@@ -100,6 +103,23 @@ def _blind(angles: np.ndarray, hears: np.ndarray) -> Optional[Cause]:
         return None
     degrees = 360.0 * longest / _SECTORS
     return Cause(f"the sonar hears nothing in {degrees:.0f} deg of its circle", _CERTAIN, metres=0.5)
+
+
+def _doubled(beams: Sequence[PlacedBeam]) -> Optional[Cause]:
+    """Return whether most beams are like themselves at twice the range, more than at any other ratio of ranges."""
+    chosen = (one.beam.intensities.astype(float) for one in beams[:: max(len(beams) // _SAMPLE, 1)])
+    alike = np.array([_alike_at(strengths) for strengths in chosen]).reshape(-1, len(_RATIOS))
+    alike = alike[np.isfinite(alike).all(axis=1)]
+    if len(alike) < _FEWEST or np.mean(alike[:, 0] > alike[:, 1:].max(axis=1)) < _MOSTLY:
+        return None
+    return Cause("echoes come twice, from twice as far again, as by the surface or the hull", _CERTAIN, metres=1.0)
+
+
+def _alike_at(strengths: np.ndarray) -> List[float]:
+    """Return the correlations of the far part of a beam with its nearer parts, by the ratios of ranges."""
+    bins = np.arange(int(_NEAREST * len(strengths)), len(strengths))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return [float(np.corrcoef(strengths[bins], strengths[(bins / one).astype(int)])[0, 1]) for one in _RATIOS]
 
 
 def _loudest(placed: PlacedBeam) -> float:

@@ -1,10 +1,11 @@
 """What is wrong with a run, when and by how much; the evidence ranks several."""
 
 from dataclasses import dataclass
-from typing import Any, Dict, Iterable, List, Sequence
+from typing import Any, Dict, Iterable, List, Optional, Sequence
 
 import numpy as np
 
+from mlsm_manager.odometry.faults import MotionFault
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
 
@@ -20,6 +21,7 @@ class Cause:
     text: what and how much, one clause. evidence: nats over "nothing is wrong". begin: s, when it began; NaN where it
     holds for the whole run. is_mended: whether the run went on without it.
     turn: rad, length: relative, metres: by how much the path from `begin` on may be turned, too long, and shifted.
+    fault: of the odometry, which a fit may mend; None where it is none.
     """
 
     text: str
@@ -29,6 +31,7 @@ class Cause:
     turn: float = 0.0
     length: float = 0.0
     metres: float = 0.0
+    fault: Optional[MotionFault] = None
 
     def to_mapping(self, run_begin: float) -> Dict[str, Any]:
         """Return it for summary.json; run_begin: s."""

@@ -4,8 +4,9 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.odometry.faults import slip_text
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.carried import carried
 from mlsm_manager.self_check.causes import Cause, ranked
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
 
@@ -45,7 +46,8 @@ def echo_findings(
     if nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD):
         turn = TURN_DEVIATION if best.is_over else abs(best.turn)
         return EchoFindings([Cause(_turn_text(best), nats, turn=turn)], best)
-    return EchoFindings([*_delayed(pairs, honest), *_shifted(pairs, honest), *_slipped(pairs)], AS_TOLD)
+    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_slipped(pairs), *carried(pairs, _NATS)]
+    return EchoFindings(ranked(found), AS_TOLD)
 
 
 def _reports_positions(scans: Sequence[Scan]) -> bool:
@@ -110,5 +112,6 @@ def _slipped(pairs: ScanPairs) -> List[Cause]:
         nats = evidence_of(apart, table[row], len(np.unique(near.pairs[across, 1])), alike)
         nats -= np.log(len(near.begins) * len(_SLIPS))
         if nats > _NATS and abs(_SLIPS[row]) > _SLIP_TOLD:
-            found.append(Cause(slip_text(_SLIPS[row]), nats, float(begin), turn=abs(_SLIPS[row])))
+            fault = MotionFault(FaultKind.SLIP, float(begin), (float(_SLIPS[row]),))
+            found.append(Cause(fault.text, nats, fault.begin, turn=abs(_SLIPS[row]), fault=fault))
     return ranked(found)[:1]

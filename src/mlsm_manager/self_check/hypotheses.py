@@ -130,7 +130,25 @@ class ScanPairs:
         trees = [cKDTree(places) for places in placed]
         apart = [np.minimum(trees[one].query(placed[other])[0], _FAR).mean() for one, other in pairs]
         begins = np.array([one.times[0] for one in self._heard])
-        return NearPairs(np.array(pairs).reshape(-1, 2), begins, np.array(apart))
+        middles = np.array([one.times.mean() for one in self._heard])
+        return NearPairs(np.array(pairs).reshape(-1, 2), begins, middles, np.array(apart))
+
+    def carried(self, pairs: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+        """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the vehicle went by `velocities` (k, 2) [m/s]
+        faster than it does if nothing is wrong.
+        """
+        table, honest = np.empty((len(velocities), len(pairs))), self.honest
+        for column, (one, other) in enumerate(pairs):
+            tree, later = cKDTree(self._placed(self._heard[one], honest)), self._placed(self._heard[other], honest)
+            moves = velocities * (self._heard[other].times.mean() - self._heard[one].times.mean())
+            table[:, column] = [np.minimum(tree.query(later + move)[0], _FAR).mean() for move in moves]
+        return table
+
+    def in_odometry(self, velocity: np.ndarray, time: float) -> np.ndarray:
+        """Return a velocity (2,) of `carried` in odom."""
+        if not self.honest.as_solved:
+            return velocity
+        return rotated(velocity[np.newaxis], -self._corrections.at(np.array([time]))[:, 2])[0]
 
     def turned(self, pairs: np.ndarray, turns: np.ndarray) -> np.ndarray:
         """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) is turned by `turns` (k,)."""
@@ -145,11 +163,16 @@ class ScanPairs:
 
 
 class NearPairs(NamedTuple):
-    """pairs: (p, 2) numbers of scans. begins: (n,) s, of all scans. distances: (p,) m between those of each pair."""
+    """pairs: (p, 2) numbers of scans. begins, middles: (n,) s, of all scans. distances: (p,) m, of each pair."""
 
     pairs: np.ndarray
     begins: np.ndarray
+    middles: np.ndarray
     distances: np.ndarray
+
+    def within(self, first: int, last: int) -> np.ndarray:
+        """Return which pairs (p,) are of the scans `first` to `last`."""
+        return (self.pairs[:, 0] >= first) & (self.pairs[:, 1] <= last)
 
 
 def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Optional[np.ndarray] = None) -> float:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
+from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
@@ -82,6 +83,7 @@ def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
         (broken.mount_upside_down(WHOLE), "the sonar is upside down"),
         (broken.head_slips(WHOLE, MIDDLE, 40.0), "the head slipped by "),
         (broken.delayed(WHOLE, 8.0), "beams were sent"),
+        (rare.bottom_lost(WHOLE, MIDDLE, 40.0), "the vehicle was carried by 1"),
     ],
 )
 def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said):
@@ -100,6 +102,7 @@ def test_nothing_is_named_where_nothing_is_wrong():
         (broken.head_stops(WHOLE, MIDDLE, 60.0), "the head stood for 60 s", MIDDLE),
         (broken.head_stops(WHOLE, MIDDLE, 60.0, tells=False), "the head stood for ", MIDDLE),
         (broken.gain_changed(WHOLE, MIDDLE, 0.3), "the gain changed: echoes are 0.3 times as strong", MIDDLE),
+        (rare.echoes_double(WHOLE, 0.7), "echoes come twice", np.nan),
         (broken.half_blind(WHOLE), "the sonar hears nothing in 170 deg of its circle", np.nan),
     ],
 )

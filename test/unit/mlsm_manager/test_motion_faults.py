@@ -20,6 +20,7 @@ STEP = MotionFault(FaultKind.STEP, START + 100.0, (0.2,))
 CIRCLE = MotionFault(FaultKind.CIRCLE, np.nan, (0.02, 0.1, -0.05, 0.03))
 LENGTH = MotionFault(FaultKind.LENGTH, np.nan, (0.1,))
 DISTANCES = MotionFault(FaultKind.DISTANCES, START + 100.0, (-0.4,))
+CARRIED = MotionFault(FaultKind.CARRIED, START + 100.0, (0.3, 0.4), START + 120.0)
 
 
 @pytest.mark.parametrize("fault", [DRIFT, STEP, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
@@ -41,6 +42,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (STEP, "the head slipped by 11 deg, or the compass stepped,"),
         (LENGTH, "reported distances are 0.90 times the true ones"),
         (DISTANCES, "reported distances are 1.49 times the true ones"),
+        (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
     ],
 )
 def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
@@ -69,6 +71,11 @@ def test_distances_that_change_are_named_first(halved):
 def test_a_path_is_fitted_without_the_fault(halved):
     apart = np.hypot(*(halved.run.best - WHOLE.track.at(halved.run.times))[:, :2].T)
     assert apart.mean() < 1.5  # m; 3 without
+
+
+def test_a_current_moves_what_comes_after_it():
+    moved = (CARRIED.mended(WHOLE.track).poses - WHOLE.track.poses)[:, :2]
+    np.testing.assert_allclose(moved[[0, -1]], [[0.0, 0.0], [6.0, 8.0]])
 
 
 @pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
