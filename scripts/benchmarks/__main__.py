@@ -28,6 +28,7 @@ STUDIES = (
     "chart",
     "faults",
     "heads",
+    "honest",
     "link",
     "logs",
     "long_run",

@@ -3,7 +3,7 @@
 import threading
 from dataclasses import dataclass
 from enum import Enum
-from typing import List, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -17,6 +17,11 @@ _OUTSTANDING = 8.0  # times the usual step around
 _AROUND = 10  # poses before and after that tell what is usual
 _NEXT = 0.3  # s: between two poses of a slow odometry that goes on
 _AT_ZERO = 0.5  # m: where an odometry is that began again
+_STALLS = (1.0, 10.0)  # s of equal poses: longer than between two poses; longer ones may be a vehicle that stands
+_BEFORE = 1.0  # s before a stall that tell how the vehicle went
+_GOES = np.array([0.05, np.radians(2.0)])  # m/s, rad/s: by less it may be stopping
+_TO_AND_FRO = 3  # changes of direction in that second
+_AS_BEFORE = 0.5  # share of that speed that the last step before a stall has, and the first one after it
 
 
 @dataclass(frozen=True)
@@ -39,16 +44,21 @@ class StepKind(Enum):
     JUMPED = "odometry jumped by {size:.1f} m"
     RESTARTED = "odometry started again from zero, {size:.1f} m off"
     COMPASS = "compass stepped by {turn:.0f} deg"
+    STALLED = "odometry stalled, and missed {size:.1f} m and {turn:.0f} deg"
 
 
 @dataclass(frozen=True)
 class Step:
-    """An impossible step. time: s, of the first pose after it. size: m. turn: rad."""
+    """An impossible step. time: s, of the first pose after it. size: m. turn: rad.
+
+    lost: s, in which nothing tells how the vehicle went.
+    """
 
     kind: StepKind
     time: float
     size: float
     turn: float
+    lost: float = 0.0
 
     @property
     def text(self) -> str:
@@ -60,7 +70,8 @@ class ContinuousOdometry:
     """Follows T_odom_base and says what has to be put before it, so that it never jumps.
 
     A step is left out in the vehicle's frame: it goes on with the speed of the step before. So positions and headings
-    after a step hang together as they were reported. What it reports at once after its clock has stood is no step.
+    after a step hang together as they were reported. While the odometry stalls it goes on likewise. What it reports at once
+    after its clock has stood is no step.
 
     stood: from when to when [s] its stamps went on after they had stood.
 
@@ -98,15 +109,33 @@ class ContinuousOdometry:
             known = len(self._newest.times)
         else:
             known = 1
-        for number in impossible_steps(track, self._limits):
+        stalled = {stall.end: stall for stall in stalls(track)}
+        for number in sorted({*impossible_steps(track, self._limits), *stalled}):
             if number >= known and not self._stood_until(*track.times[number - 1 : number + 1]):
-                self._leave_out(track, number)
-        self._newest = Track(track.times[-_AROUND:], track.poses[-_AROUND:])
+                if number in stalled:
+                    self._bridge(track, stalled[number])
+                else:
+                    self._leave_out(track, number)
+        oldest = int(np.searchsorted(track.times, track.times[-1] - sum(_STALLS) - _BEFORE))
+        newest = slice(min(oldest, max(len(track.times) - _AROUND, 0)), None)
+        self._newest = Track(track.times[newest], track.poses[newest])
         self._known = True
 
     def _stood_until(self, before: float, after: float) -> bool:
         """Return whether a clock that had stood went on between two times [s]."""
         return any(before < end and after > begin for begin, end in list(self.stood))
+
+    def _bridge(self, track: Track, stall: "Stall") -> None:
+        """Let the odometry go on while it stalled; where it jumped afterwards, by as much as it jumped."""
+        before, after = track.poses[stall.begin], track.poses[stall.end]
+        step, missed = composed(inverse(before), after), stall.missed.copy()
+        if np.hypot(*(step - stall.usual)[:2]) > LEAST_STEP[0]:
+            missed[:2] = step[:2]
+        if abs(wrapped(step[2] - stall.usual[2])) > LEAST_STEP[1]:
+            missed[2] = step[2]
+        self._expected = composed(composed(self._fixes[-1], before), missed)
+        times, jumped = track.times[[stall.begin, stall.end]], not np.array_equal(missed[:2], stall.missed[:2])
+        self._put(StepKind.STALLED, times, missed, after, 0.0 if jumped else float(times[1] - times[0]))
 
     def _leave_out(self, track: Track, number: int) -> None:
         """Let the odometry go on without the step to pose `number`."""
@@ -119,13 +148,17 @@ class ContinuousOdometry:
         # Where the last pose was a step itself its place is known better than from a large step and back.
         place = self._expected if self._starts[-1] == track.times[number - 1] else composed(self._fixes[-1], before)
         self._expected = composed(place, self._usual)
-        fix = composed(self._expected, inverse(after))
-        self.steps.append(Step(_kind(after, step, self._limits), float(track.times[number]),
-                               float(np.hypot(*step[:2])), float(wrapped(step[2]))))  # fmt: skip
-        self._begins.append(float(track.times[number - 1]))
+        self._put(_kind(after, step, self._limits), track.times[[number - 1, number]], step, after)
+
+    def _put(
+        self, kind: StepKind, times: np.ndarray, step: np.ndarray, after: np.ndarray, lost: float = 0.0
+    ) -> None:  # fmt: skip
+        """Put the pose `after` a step (3,) to where it is expected; times: (2,) s, of the poses before and after it."""
+        self.steps.append(Step(kind, float(times[1]), float(np.hypot(*step[:2])), float(wrapped(step[2])), lost))
+        self._begins.append(float(times[0]))
         # The fix comes first: others search the starts.
-        self._fixes.append(fix)
-        self._starts.append(float(track.times[number]))
+        self._fixes.append(composed(self._expected, inverse(after)))
+        self._starts.append(float(times[1]))
 
     def goes_on_at(self, pose: np.ndarray) -> bool:
         """Return whether T_odom_base `pose` (3,) is where the vehicle was just before, so that only a clock jumped."""
@@ -152,6 +185,49 @@ class ContinuousOdometry:
             within |= (track.times > begin) & (track.times < step.time)
         times, poses = track.times[~within], track.poses[~within]
         return Track(times, composed(self.fixes(times), poses)) if len(times) else track
+
+
+class Stall(NamedTuple):
+    """begin, end: of the poses, the first that stood and the first after it. missed, usual: (3,) in base_link, how the
+    vehicle went meanwhile, and in a step as long as the last one, if it went on as before.
+    """
+
+    begin: int
+    end: int
+    missed: np.ndarray
+    usual: np.ndarray
+
+
+def stalls(track: Track) -> List[Stall]:
+    """Return where the pose stood for seconds, though no vehicle stops and starts so suddenly."""
+    same = np.concatenate([[False], (np.diff(track.poses, axis=0) == 0.0).all(axis=1), [False]])
+    stretches = np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2)
+    found = (_stall(track, int(first), int(last)) for first, last in stretches if last + 1 < len(track.times))
+    return [stall for stall in found if stall is not None]
+
+
+def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
+    times, poses = track.times, track.poses
+    seconds, start = times[last] - times[first], int(np.searchsorted(times, times[first] - _BEFORE))
+    if not _STALLS[0] <= seconds < _STALLS[1] or first - start < 2:
+        return None
+    steps = composed(inverse(poses[start:first]), poses[start + 1 : first + 1])
+    rates = steps / np.diff(times[start : first + 1])[:, np.newaxis]
+    usual, step = np.median(rates, axis=0), composed(inverse(poses[last]), poses[last + 1])
+    speeds, sudden, again = (_speeds(one) for one in (usual, rates[-1], step / (times[last + 1] - times[last])))
+    goes = (speeds > _GOES) & (sudden > _AS_BEFORE * speeds) & (again > _AS_BEFORE * speeds)
+    if not goes.any() and not _trembles(steps[:, 2]):
+        return None
+    return Stall(first, last + 1, usual * (times[last + 1] - times[first]), usual * (times[last + 1] - times[last]))
+
+
+def _trembles(turns: np.ndarray) -> bool:
+    """Return whether a heading is one that is measured: such a one turns to and fro and never stands."""
+    return bool((turns != 0.0).all() and np.count_nonzero(np.diff(np.sign(turns))) >= _TO_AND_FRO)
+
+
+def _speeds(rates: np.ndarray) -> np.ndarray:
+    return np.array([np.hypot(*rates[:2]), abs(rates[2])])
 
 
 def impossible_steps(track: Track, limits: MotionLimits) -> np.ndarray:

@@ -11,6 +11,7 @@ from mlsm_manager.self_check.verdict import moment
 
 CERTAIN = 1e3  # nats: of what needs no echo to be seen
 _FEW = 3  # steps that are told one by one
+_SPEED_CHANGE, _TURN_RATE = 0.15, 0.05  # m/s, rad/s: by which a small vehicle changes its motion while it works
 _LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, besides what it did just before
 
 
@@ -56,12 +57,18 @@ def of_steps(steps: Sequence[Step]) -> List[Cause]:
     return [cause for of_kind in kinds for cause in _of_kind(of_kind)]
 
 
-def _of_kind(steps: Sequence[Step]) -> List[Cause]:
-    if len(steps) <= _FEW:
-        return [Cause(step.text, CERTAIN + step.size, step.time, True, metres=_LEFT) for step in steps]
-    most = max(steps, key=lambda step: (step.size, abs(step.turn)))
-    text = f"{most.text} at most, {len(steps)} times, first"
-    return [Cause(text, CERTAIN + most.size, steps[0].time, True, metres=_LEFT * float(np.sqrt(len(steps))))]
+def _of_kind(steps: List[Step]) -> List[Cause]:
+    groups = [[step] for step in steps] if len(steps) <= _FEW else [steps]
+    return [_of_step(group) for group in groups]
+
+
+def _of_step(steps: List[Step]) -> Cause:
+    """Return the cause for one step, or for many of a kind. An odometry that keeps stalling is not mended."""
+    most, lost = max(steps, key=lambda step: (step.size, abs(step.turn))), [step.lost for step in steps]
+    text = most.text if len(steps) == 1 else f"{most.text} at most, {len(steps)} times, first"
+    seconds, is_mended = float(np.linalg.norm(lost)), len(steps) == 1 or not any(lost)
+    metres = float(np.hypot(_LEFT * np.sqrt(len(steps)), _SPEED_CHANGE * seconds))
+    return Cause(text, CERTAIN + most.size, steps[0].time, is_mended, _TURN_RATE * seconds, metres=metres)
 
 
 def widened(

@@ -55,6 +55,29 @@ def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
     assert np.hypot(*apart[-100:, :2].T).max() < 1.0
 
 
+@pytest.mark.parametrize("goes_on", [True, False])
+def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
+    mended, causes = with_odometry_mended(broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on), LIMITS)
+    assert causes[0].text.startswith("odometry stalled, and missed 1.")
+    assert causes[0].begin == pytest.approx(START + MIDDLE + 5.0, abs=0.3)
+    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
+    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+
+
+def test_an_odometry_that_keeps_stalling_leaves_the_run_doubtful():
+    _, causes = with_odometry_mended(rare.odometry_stalls(WHOLE, 5.0, every=30.0), LIMITS)
+    assert [cause.is_mended for cause in causes] == [False]
+    assert causes[0].text.endswith("9 times, first")
+
+
+def test_a_vehicle_that_stops_for_a_while_does_not_stall():
+    seconds = WHOLE.track.times - START
+    goes = 1.0 - np.clip(np.minimum(seconds - MIDDLE, MIDDLE + 11.0 - seconds) / 2.0, 0.0, 1.0)
+    steps = broken.steps_of(WHOLE.track.poses) * goes[1:, np.newaxis]
+    poses = broken.integrated(WHOLE.track.poses[0], steps)
+    assert with_odometry_mended(WHOLE.with_track(Track(WHOLE.track.times, poses)), LIMITS)[1] == []
+
+
 def test_many_steps_are_one_cause():
     _, causes = with_odometry_mended(broken.odometry_jumps(WHOLE, 30.0, 1.0, every=30.0), LIMITS)
     assert len(causes) == 1

@@ -1,0 +1,104 @@
+"""Prints which causes are named where nothing is broken: none is wanted.
+
+Each recording is mapped as `map_bag RECORDING --refine` does it. "live": what mlsm_core would have said meanwhile, with
+a look at the newest scans after each third one. The odometry of simulated tours has the usual errors of a DVL and a
+compass, drawn with the seed, or more of one kind.
+"""
+
+import re
+from argparse import Namespace
+from functools import partial
+from pathlib import Path
+from typing import Callable, Dict, List, Set
+
+from benchmarks.faults import map_bag_options, source
+from benchmarks.harness import benchmark_parser, recorded
+from benchmarks.tours import simulated
+from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.recording import Recording, read_recording
+from mlsm_manager.self_check.live_causes import LiveCauses
+from recordings.bags.bag import RecordingError
+from recordings.reader import Request
+
+_BAGS = (
+    "marina_first.bag", "marina_whole_blind.bag", "marina_first_dvl.bag", "micron_static.bag", "micron_scanline.bag",
+    "tritech_micron_native.bag",
+)  # fmt: skip
+_TOURS = ("harbour", "harbour_ahead", "basin", "basin_ahead", "harbour_turning")
+_ERRORS = {"usual errors": {}, "current of 0.1 m/s": {"current": 0.1}, "compass drifts": {"heading_walk": 0.001}}
+_LOGS = "ping360_logs"
+
+
+def recordings(seeds: List[int]) -> Dict[str, Callable[[], Recording]]:
+    """Return how to get each recording, by its name."""
+    bags = [recorded(name) for name in _BAGS] + sorted(recorded(_LOGS).iterdir())
+    return {
+        **{bag.name: partial(_read, bag) for bag in bags},
+        "marina, 600 s": partial(source, "marina", 600.0),
+        **{
+            f"{tour}, {what}, seed {seed}": partial(_drawn, tour, seed, errors)
+            for seed in seeds
+            for what, errors in _ERRORS.items()
+            for tour in _TOURS
+        },
+    }
+
+
+def _read(path: Path) -> Recording:
+    return read_recording(path, Request())
+
+
+def _drawn(tour: str, seed: int, errors: Dict[str, float]) -> Recording:
+    return simulated(f"{tour}_tour").with_dvl(seed, **errors)
+
+
+def live_causes(mapped: MappedBag) -> Set[str]:
+    """Return what is said while the run goes on."""
+    live, said = LiveCauses(), set()
+    live.sonar_in_base = mapped.recording.sonar_in_base
+    for update in mapped.replayed.updates:
+        if update.belief is None:
+            return set()
+        live.take(update.scan, update.belief.theta[:3])
+        live.look()
+        said |= {cause.text for cause in live.causes([])}
+    return said
+
+
+def offline_causes(mapped: MappedBag) -> Set[str]:
+    """Return what is said of the whole run."""
+    trust = None if mapped.findings is None else mapped.findings.trust
+    return set() if trust is None else {cause.text for cause in trust.causes}
+
+
+def main() -> None:
+    """Print the table, line by line, and how many recordings have causes."""
+    parser = benchmark_parser("honest", __doc__)
+    parser.add_argument("--rows", default=".", metavar="REGEX", help="of which recordings; default: all")
+    parser.add_argument("--seeds", type=int, nargs="+", default=[12, 13], help="of tours (default: 12 13)")
+    arguments, options = parser.parse_args(), map_bag_options()
+    runs, offline, live = 0, 0, 0
+    for name, made in recordings(arguments.seeds).items():
+        if re.search(arguments.rows, name):
+            said = _said(name, made, options)
+            runs, offline, live = runs + 1, offline + bool(said[0]), live + bool(said[1])
+    print(f"{runs} recordings: {offline} with a cause offline, {live} live")
+
+
+def _said(name: str, made: Callable[[], Recording], options: Namespace) -> List[Set[str]]:
+    """Print and return what is said of a recording offline and live."""
+    try:
+        mapped = mapped_bag(made(), options)
+    except RecordingError as refused:
+        print(f"{name:50} refused: {refused}", flush=True)
+        return [set(), set()]
+    said = [offline_causes(mapped), live_causes(mapped)]
+    print(
+        f"{name:50} offline: {'; '.join(sorted(said[0])) or '-'}   live: {'; '.join(sorted(said[1])) or '-'}",
+        flush=True,
+    )
+    return said
+
+
+if __name__ == "__main__":
+    main()
