@@ -227,7 +227,7 @@ def test_a_compass_that_errs_by_the_heading_is_an_unknown_that_is_eliminated():
     nodes, durations = np.arange(10), np.full(9, 14.0)
     yaws, layout = np.random.RandomState(1).uniform(-3.0, 3.0, 10), Layout(0, 9, 3)
     change, columns = COMPASS.change(durations), layout.node_start(nodes) + YAW
-    errors = 2.0 * COMPASS.heading_deviation * harmonics(yaws) * [1.0, 1.0, 0.5, 0.5]
+    errors = COMPASS.heading_deviation * harmonics(yaws) * [5.0, 5.0, 1.0, 1.0]
     with_errors, without = NormalEquations(layout.size + 4), NormalEquations(layout.size)
     for equations, count in ((with_errors, 4), (without, 0)):
         own = np.tile(layout.size + np.arange(count), (10, 1))
