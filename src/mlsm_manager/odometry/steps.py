@@ -70,8 +70,8 @@ class ContinuousOdometry:
     """Follows T_odom_base and says what has to be put before it, so that it never jumps.
 
     A step is left out in the vehicle's frame: it goes on with the speed of the step before. So positions and headings
-    after a step hang together as they were reported. While the odometry stalls it goes on likewise. What it reports at once
-    after its clock has stood is no step.
+    after a step hang together as they were reported. While the odometry stalls it goes on likewise. What it reports at
+    once after its clock has stood is no step.
 
     stood: from when to when [s] its stamps went on after they had stood.
 
