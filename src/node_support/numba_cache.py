@@ -26,7 +26,26 @@ def compiled(*signature: Any, **options: Any) -> Callable[[Callable[..., Any]], 
     folder, not even a temporary one.
     """
     _prepare_cache()
-    return njit(*signature, cache=True, **options)
+
+    def decorated(loop: Callable[..., Any]) -> Any:
+        _discard_unreadable(loop)
+        return njit(*signature, cache=True, **options)(loop)
+
+    return decorated
+
+
+def _discard_unreadable(loop: Callable[..., Any]) -> None:
+    """Empty a loop's cache that was written by another version of this package with classes that are gone.
+
+    Numba reads the classes before it looks whether the loop's file has changed, and fails on those that are gone.
+    """
+    cache_file = getattr(getattr(njit(cache=True)(loop), "_cache", None), "_cache_file", None)
+    if cache_file is None:
+        return
+    try:
+        cache_file._load_index()
+    except (AttributeError, ImportError):
+        cache_file.flush()
 
 
 @lru_cache(maxsize=None)

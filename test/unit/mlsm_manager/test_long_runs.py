@@ -7,7 +7,6 @@ import pytest
 from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import followed, solver_parameters
 from numba._dispatcher import compute_fingerprint
-from numba.core.dispatcher import Dispatcher
 
 from mlsm_manager.joint_solver import live_solver
 from mlsm_manager.joint_solver.live_window import nearest_groups, superfluous
@@ -158,7 +157,7 @@ def test_numba_keeps_no_description_of_the_arguments_of_each_call(monkeypatch):
     lengths = {}
     for module in [sys.modules[name] for name in sorted(sys.modules) if name.startswith("mlsm_manager.")]:
         for name, loop in list(vars(module).items()):
-            if isinstance(loop, Dispatcher):
+            if hasattr(loop, "py_func"):
                 monkeypatch.setattr(module, name, watched(loop, lengths))
     session = session_of(SCANS[:4], solver_parameters())
     made = KeyframeMap(0.5, 1000.0)

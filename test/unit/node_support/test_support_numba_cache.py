@@ -1,4 +1,4 @@
-"""Compiled loops are to be had where numba finds no folder for what it compiles."""
+"""Compiled loops are to be had where numba finds no folder, and where another version of the package compiled them."""
 
 import os
 import shutil
@@ -16,6 +16,15 @@ def one():
 @compiled("i8()")
 def two():
     return 2
+"""
+LOOP_OF_A_CLASS = """
+from typing import NamedTuple
+from node_support.numba_cache import compiled
+class {name}(NamedTuple):
+    range: float
+@compiled()
+def doubled(echo):
+    return 2.0 * echo.range
 """
 PROGRAM = """
 import logging, sys
@@ -54,3 +63,14 @@ def test_a_folder_named_by_the_user_is_enough(tmp_path):
     cache.mkdir()
     assert _output(tmp_path, NUMBA_CACHE_DIR=str(cache)) == [f"3 {cache}"]
     assert list(cache.rglob("*.nbi"))
+
+
+def test_what_was_compiled_for_a_class_that_is_gone_is_compiled_anew(tmp_path):
+    loops = tmp_path / "loops.py"
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), *sys.path]), "NUMBA_CACHE_DIR": ""}
+    for name in ("Heard", "Echo"):
+        loops.write_text(LOOP_OF_A_CLASS.format(name=name))
+        program = f"from loops import doubled, {name}; print(doubled({name}(1.5)))"
+        command = [sys.executable, "-B", "-c", program]
+        assert subprocess.run(command, env=environment, stdout=subprocess.PIPE, check=True).stdout == b"3.0\n"
+    assert list((tmp_path / "__pycache__").glob("loops.doubled*.nbi"))
