@@ -3,6 +3,7 @@
 import os
 import signal
 import subprocess
+import sys
 import time
 import xmlrpc.client
 
@@ -16,6 +17,18 @@ from node_support.ros.node import MASTER_PERIOD
 NODES = ("thresholder", "mapping", "imagenex_852_driver", "gazebo_sonar", "play_852")
 # Long enough for a node to ask the absent master more often than a new master has to be asked.
 AWAY = 4.0 * MASTER_PERIOD
+TALKATIVE = """
+import rospy
+from node_support.ros.node import MasterWatch
+rospy.init_node("talkative", disable_signals=True)
+watch = MasterWatch()
+while watch._process is None:
+    rospy.rostime.wallsleep(0.1)
+print("watched", flush=True)
+while not watch.is_lost:
+    rospy.logwarn("nothing comes")
+    rospy.rostime.wallsleep(0.1)
+"""
 
 
 class Master:
@@ -118,3 +131,17 @@ def _last_words(process):
     except subprocess.TimeoutExpired:
         process.send_signal(signal.SIGABRT)
         return process.communicate()[0]
+
+
+def test_a_node_that_logs_while_a_new_master_comes_ends_too(master):
+    """Each log line makes rospy ask the master for a parameter, which makes the node known to it."""
+    command = [sys.executable, "-c", TALKATIVE]
+    talkative = subprocess.Popen(command, env=master.environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL)
+    try:
+        assert talkative.stdout.readline() == b"watched\n"
+        master.stop()
+        master.start()
+        assert talkative.wait(START_TIMEOUT) == 0
+    finally:
+        talkative.kill()
+        talkative.communicate()

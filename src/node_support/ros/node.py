@@ -9,7 +9,7 @@ import threading
 import time
 import xmlrpc.client
 from contextlib import suppress
-from typing import Any, Callable, NoReturn, Protocol, Sequence
+from typing import Any, Callable, NoReturn, Optional, Protocol, Sequence
 
 import rosgraph
 import rospy
@@ -157,12 +157,15 @@ class MasterWatch:
 
     A master that gives no answer may only be away for a while, and the node runs on. A new master, which answers that
     it does not know the node, has neither its topics nor its parameters: nobody will ever connect to the node again.
+    It may know the node's name all the same, for rospy asks it for a parameter with each log line: then its process
+    number tells.
     """
 
     def __init__(self) -> None:
         """Begin to watch; the node has to be initialised."""
         self.is_lost = False
         self._master = xmlrpc.client.ServerProxy(rosgraph.get_master_uri(), _ImpatientTransport())
+        self._process: Optional[int] = None
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
@@ -175,10 +178,12 @@ class MasterWatch:
     def _does_not_know_us(self) -> bool:
         try:
             status, _, uri = self._master.lookupNode(rospy.get_name(), rospy.get_name())
+            process = self._master.getPid(rospy.get_name())[2]
         except Exception:
             # A master that is killed while it answers leaves half an answer, and that almost any error.
             return False
-        return status != _SUCCESS or uri != rospy.get_node_uri()
+        self._process = self._process or process
+        return status != _SUCCESS or uri != rospy.get_node_uri() or process != self._process
 
 
 # Of mallopt in glibc's malloc.h.
