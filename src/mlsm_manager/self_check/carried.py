@@ -3,7 +3,7 @@
 Pairs of scans show it: those of a stretch lie on each other once each is moved by a velocity times its time.
 """
 
-from typing import List, NamedTuple, Optional
+from typing import List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -60,7 +60,10 @@ def _likeliest(pairs: ScanPairs, near: NearPairs) -> Optional[_Stretch]:
     return max((_judged(one, within, near, table, speeds, tried) for one, within in inside.items()), key=_nats)
 
 
-def _judged(one: tuple, within: np.ndarray, near: NearPairs, table: np.ndarray, speeds: np.ndarray, tried: float):
+def _judged(
+    one: Tuple[int, int], within: np.ndarray, near: NearPairs, table: np.ndarray, speeds: np.ndarray, tried: float
+) -> _Stretch:
+    """Return the likeliest velocity of a stretch, `one` from scan to scan; table: distances by speed and pair."""
     row = int(table[:, within].mean(axis=1).argmin())
     apart, alike = near.distances[within], near.distances[~within]
     if len(alike) < _FEWEST:
