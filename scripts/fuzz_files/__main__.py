@@ -25,6 +25,7 @@ def fuzz(sample: Sample, count: int, seed: int, folder: Path) -> List[str]:
         outcome = run(sample, command, path, folder / "run")
         ends["read" if outcome.status == 0 else "refused"] += 1
         complaints = list(outcome.complaints(_size(path), command[0]))
+        complaints += sample.maker.complaints(folder / "run/out") if sample.maker else []
         if number == 0 and outcome.status not in (0, INTERRUPTED):
             complaints.append(f"the sound file is refused: {outcome.lines[-1:]}")
         found += [f"{sample.kind}, seed {seed}, mutation {number}, {command[0]}: {one}" for one in complaints]
@@ -43,8 +44,8 @@ def _copy(sample: Sample, number: int, seed: int, folder: Path) -> Path:
     else:
         target = Path(shutil.copyfile(str(sample.path), str(path)))
     if number:
-        rng = np.random.default_rng([seed, number])
-        target.write_bytes(mutated(target.read_bytes(), sample.is_text, rng))
+        rng, maker = np.random.default_rng([seed, number]), sample.maker
+        target.write_bytes(maker.make(rng) if maker else mutated(target.read_bytes(), sample.is_text, rng))
     return path
 
 

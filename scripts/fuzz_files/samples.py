@@ -3,15 +3,17 @@
 import shutil
 from dataclasses import dataclass
 from pathlib import Path
-from typing import List, Tuple
+from typing import List, Optional, Tuple
 
 import numpy as np
 import yaml
+from benchmarks.harness import recorded
 from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
+from test_any_log import written
 from test_driver_log import RECORDS
 from test_ping_viewer_next import write as write_ping_viewer_next
-from test_recordings_ping_viewer import beam_bytes, log_bytes
 
+from fuzz_files.logs import LogMaker
 from mlsm_manager.offline.replay import ReplayParameters, live_text
 from node_support.files import package_folder
 from sonar_simulator.simulation.simulate_bag import main as simulate_bag
@@ -19,6 +21,7 @@ from sonar_simulator.simulation.simulate_bag import main as simulate_bag
 FILE, OUT = "FILE", "OUT"
 """Stand in a command for the damaged file and for the folder to write to."""
 _READ = (("convert_bag", FILE, f"{OUT}/out.bag"), ("map_bag", FILE, "--inspect"))
+_MAPPED = (("map_bag", FILE, "--out", OUT), ("map_bag", FILE, "--out", OUT, "--refine"))
 _STANDING = (("convert_bag", FILE, f"{OUT}/out.bag", "--standing"),)
 _QUICK = ("--quiet", "--set", "sonar.ray_rows=3", "sonar.ray_columns=1", "clock_rate=4.0")
 _SCRIPT = """\
@@ -36,7 +39,8 @@ class Sample:
     """A sound file and the commands that read it: a program of nodes/ and its arguments each.
 
     damaged: the file to damage within `path`, where that is a folder. is_text: also words and numbers are replaced.
-    may_be_endless: what is asked for may take hours; such a run is interrupted.
+    may_be_endless: what is asked for may take hours; such a run is interrupted. maker: makes other files of this kind,
+    in place of damages.
     """
 
     path: Path
@@ -44,6 +48,7 @@ class Sample:
     is_text: bool = False
     damaged: str = ""
     may_be_endless: bool = False
+    maker: Optional[LogMaker] = None
 
     @property
     def kind(self) -> str:
@@ -68,7 +73,7 @@ def samples(folder: Path) -> List[Sample]:
         *folders,
         Sample(write_mcap(bags[0], folder / "mcap.mcap"), _READ),
         Sample(write_ping_viewer_next(folder / "ping_viewer_next.mcap", beams=60), _READ),
-        Sample(_bytes(folder / "ping_viewer.bin", log_bytes((0.05 * k, beam_bytes(k)) for k in range(60))), _STANDING),
+        _log(folder / "ping_viewer.bin"),
         Sample(_bytes(folder / "imagenex.852", b"".join(RECORDS) * 10), _STANDING),
         Sample(_text(folder / "table.csv", _table()), (table,), is_text=True),
         Sample(live, (mapped,), is_text=True),
@@ -95,6 +100,13 @@ def _of_the_simulator(folder: Path, script: Path) -> List[Sample]:
     }
     texts = (".yaml", ".urdf", ".sdf", ".obj", ".dae")
     return [Sample(path, (command,), path.suffix in texts, "", True) for path, command in commands.items()]
+
+
+def _log(path: Path) -> Sample:
+    """Return a log of a room, and a maker of others: of real ones where there are some."""
+    written(path, [(angle % 400, reach, 1) for reach in (15.0, 30.0) for angle in range(0, 800, 2)])
+    real = sorted(recorded("ping360_logs").glob("*.bin"))
+    return Sample(path, (*_MAPPED, *_READ, *_STANDING), maker=LogMaker(real or [path]))
 
 
 def _simulated(path: Path, script: Path, compression: str) -> Path:

@@ -14,11 +14,13 @@ from typing import Iterator, Optional, Tuple
 
 TITLE = "PingViewer sensor log file"
 
+_BEGINNING = struct.pack(">I", 2 * len(TITLE)) + TITLE.encode("utf-16-be")
 _BUILD_TEXTS = 5  # Commit, date, release, name and version of the operating system
 _NULL = 0xFFFFFFFF  # Length of a text or of data that Qt calls null
-_LONGEST_PART = 10240  # Bytes, the buffer of Ping Viewer's parser
+_LONGEST_PART = 10240  # Bytes, the buffer of Ping Viewer's parser; a log holds longer ones where the computer was busy
 _HALF_DAY = 12 * 3600.0  # s
 _BACK = 11 * 3600.0  # s: a clock that goes back by more began a new half of a day, in a language not known here
+_SET_BACK = 1.0  # s: one that goes back by more was set
 # Hours, minutes and seconds with the same sign between them, and milliseconds, which a date beside them does not have.
 _CLOCK = re.compile(r"(?<!\d)(\d{1,2})([^\d\s])([0-5]\d)\2([0-5]\d)\D(\d{3})(?!\d)")
 _AFTERNOON = {"pm", "بظ", "بعدازظهر", "م", "下午", "午後", "오후", "μμ"}
@@ -50,13 +52,15 @@ class PingViewerLog:
         self._start = 0 if self._time(0) is not None else self._first_part()
 
     def __iter__(self) -> Iterator[LoggedPart]:
-        position, last, halves = self._start, 0.0, 0
+        position, last, shift = self._start, 0.0, 0.0
         while position < len(self._data):
             part, position = self._part(position)
             if part is not None:
-                while part.time + halves * _HALF_DAY < last - _BACK:
-                    halves += 1
-                last = max(last, part.time + halves * _HALF_DAY)
+                while part.time + shift < last - _BACK:
+                    shift += _HALF_DAY
+                if part.time + shift < last - _SET_BACK:
+                    shift = last - part.time
+                last = max(last, part.time + shift)
                 yield LoggedPart(last, part.data)
 
     def _first_part(self) -> int:
@@ -65,10 +69,10 @@ class PingViewerLog:
             return _after_header(self._data)
         except NoLogError:
             first = self._next_time(0, min(len(self._data), 2 * _LONGEST_PART))
-            if first is None:
-                raise
             self.damaged += 1
-            return first
+            if first is None and not self._data.startswith(_BEGINNING):
+                raise
+            return len(self._data) if first is None else first
 
     def _part(self, position: int) -> Tuple[Optional[LoggedPart], int]:
         """Return the part at `position`, if there is one, and where to continue."""
@@ -77,7 +81,7 @@ class PingViewerLog:
             time, start = found
             end = start + _length(self._data, start - 4)
             # Where another part begins within the data of one, or with their length, its own end is lost.
-            if end <= min(start + _LONGEST_PART, len(self._data)) and self._next_time(start - 4, end) is None:
+            if end <= len(self._data) and self._next_time(start - 4, end) is None:
                 return LoggedPart(time, self._data[start:end]), end
         self.damaged += 1
         following = self._next_time(position + 1, len(self._data))
@@ -98,7 +102,8 @@ class PingViewerLog:
             _length(self._data, after)
         except (struct.error, UnicodeDecodeError):
             return None
-        time = _seconds(text)
+        # A text that began a few bytes too early, in data that end with zeros, holds the length of the true one.
+        time = None if "\0" in text else _seconds(text)
         return None if time is None else (time, after + 4)
 
 

@@ -71,7 +71,7 @@ class Content:
 def read(path: Path, request: Request) -> Content:
     """Return what is wanted of a recording. Raises RecordingError, with everything that is missing at once."""
     with ExitStack() as stack:
-        main = None if is_makers_log(path) else stack.enter_context(Bag(path))
+        main = None if is_makers_log(path) else stack.enter_context(bag_of_beams(path))
         vehicle = None if request.vehicle is None or _reader_of_motion(request.vehicle) else Bag(request.vehicle)
         bags = [main, stack.enter_context(vehicle) if vehicle else None]
         problems: List[str] = []
@@ -87,6 +87,13 @@ def read(path: Path, request: Request) -> Content:
     recorded = recorded.later(_offset(recorded, tree, request, notes))
     _check_common_time(path, recorded, tree, request)
     return Content(recorded, Motion(tree, motion.source, [*motion.notes, *notes]), truth)
+
+
+def bag_of_beams(path: Path) -> Bag:
+    """Return the bag at `path`. Raises RecordingError where there is none, also for an autopilot's log."""
+    if is_autopilot_log(path):
+        raise RecordingError(f"{path}: an autopilot's log holds no beams: map the sonar's with --vehicle {path}")
+    return Bag(path)
 
 
 def mounted(

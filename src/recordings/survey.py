@@ -19,7 +19,7 @@ from recordings.motion.frame_tree import FrameTree, frame_tree
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.sweep_shifts import sweep_shifts
 from recordings.motion.vehicle_motion import Motion, MotionSource
-from recordings.reader import Request, motion_for, mounted, tried
+from recordings.reader import Request, bag_of_beams, motion_for, mounted, tried
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.scans.assembler import turns_of
 
@@ -62,7 +62,7 @@ def survey(path: Path, request: Request) -> Survey:
         assumed = _assumed(motion, recorded, request, missing)
         heard = beam_lines(recorded)
         return Survey(path, "a log or table of beams", {}, FrameTree(), None, heard, [], assumed, missing)
-    with Bag(path) as bag:
+    with bag_of_beams(path) as bag:
         return _survey_of_bag(path, bag, request)
 
 

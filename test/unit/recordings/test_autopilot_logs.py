@@ -14,8 +14,10 @@ from recordings.motion.autopilot_log import fixes_of_autopilot, is_autopilot_log
 from recordings.motion.clock_offset import clock_offset
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
+from recordings.reader import Request, read
 
 START = 1_700_000_000
+AFTER = 600.0  # s: the motion begins so long after the clock of the beams, which then can be ahead
 YAWS = np.linspace(0.1, 1.5, 20)
 
 
@@ -23,14 +25,16 @@ def track_of(recording):
     times, poses = recording.track.times, recording.track.poses
     level, half = np.zeros((len(times), 2)), poses[:, 2] / 2.0
     turns = np.column_stack([level, np.sin(half), np.cos(half)])
-    return PoseTrack(np.round(times * 1e9).astype(np.int64), np.column_stack([poses[:, :2], level[:, :1]]), turns)
+    return PoseTrack(
+        np.round((AFTER + times) * 1e9).astype(np.int64), np.column_stack([poses[:, :2], level[:, :1]]), turns
+    )
 
 
-@pytest.mark.parametrize("seconds", [0.0, -20.0])
+@pytest.mark.parametrize("seconds", [0.0, 1.0, -1.0, 20.0, -20.0, 300.0, -300.0])
 def test_the_echoes_tell_how_far_the_clocks_are_apart(seconds):
     made = wandering()
-    beams = RecordedBeams([placed.beam for placed in made.beams], []).later(-seconds).beams
-    found = clock_offset(beams, track_of(made), np.eye(4), farthest=40.0)
+    beams = RecordedBeams([placed.beam for placed in made.beams], []).later(AFTER - seconds).beams
+    found = clock_offset(beams, track_of(made), np.eye(4))
     assert found.seconds == pytest.approx(seconds, abs=0.3)
     assert found.deviation < 0.3
 
@@ -78,6 +82,12 @@ def test_telemetry_holds_poses_or_where_positions_stay_a_heading_and_a_depth(tmp
     np.testing.assert_array_equal(track.stamps_ns, (START + np.arange(20)) * 10**9)
     np.testing.assert_allclose(track.translations, np.column_stack([north, -2.0 * north, np.full(20, -3.0)]), atol=1e-5)
     np.testing.assert_allclose(2.0 * np.arctan2(*track.rotations[:, 2:].T), -YAWS, atol=1e-6)
+
+
+def test_an_autopilot_s_log_in_place_of_a_recording_is_named_with_what_to_do(tmp_path):
+    (tmp_path / "dive.tlog").write_bytes(b"")
+    with pytest.raises(RecordingError, match="--vehicle"):
+        read(tmp_path / "dive.tlog", Request())
 
 
 def test_a_log_without_an_attitude_or_none_at_all_is_refused(tmp_path):

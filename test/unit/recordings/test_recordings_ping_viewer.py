@@ -144,6 +144,27 @@ def test_times_go_on_after_midnight():
     assert [part.time for part in log] == [86399.0, 86401.0, 86401.0]
 
 
+def test_times_go_on_where_the_clock_was_set_back():
+    log = PingViewerLog(log_bytes([(100.0, b"a"), (80.0, b"b"), (80.5, b"c"), (140.0, b"d")]))
+    assert [part.time for part in log] == [100.0, 100.0, 100.5, 160.0]
+
+
+def test_zeros_at_the_end_of_a_part_are_not_taken_for_the_beginning_of_the_next():
+    """As of 12 parts of one real log: the last bytes of a beam without echoes, and its checksum."""
+    parts = [(1.0, b"x" * 20 + b"\0\0\0\x3e"), (2.0, b"y" * 30)]
+    log = PingViewerLog(log_bytes(parts))
+    assert [(part.time, part.data) for part in log] == parts
+    assert log.damaged == 0
+
+
+def test_a_part_is_as_long_as_the_computer_was_busy(tmp_path):
+    path = tmp_path / "busy.bin"
+    path.write_bytes(
+        log_bytes([(1.0, beam_bytes(1)), (9.0, b"".join(map(beam_bytes, range(2, 60)))), (9.1, beam_bytes(60))])
+    )
+    assert len(makers_beams(path).beams) == 60
+
+
 def test_it_is_known_by_its_first_bytes(turn, tmp_path):
     other = tmp_path / "other.bin"
     other.write_bytes(b"\0" * 100)
@@ -156,9 +177,10 @@ def test_it_is_read_as_a_recording_of_a_standing_vehicle(turn):
     assert held.recorded.beams[0].stamp_ns == pytest.approx((1e9 + 5.0) * 1e9, abs=1e7)
 
 
-def test_a_log_without_beams_is_refused(tmp_path):
+@pytest.mark.parametrize("length", [None, -30])
+def test_a_log_without_beams_is_refused_also_where_its_header_is_cut(tmp_path, length):
     path = tmp_path / "empty.bin"
-    path.write_bytes(log_bytes([]))
+    path.write_bytes(log_bytes([])[:length])
     with pytest.raises(RecordingError, match="is a beam of a Ping360"):
         makers_beams(path)
 
