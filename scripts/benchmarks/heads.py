@@ -1,8 +1,8 @@
 """Simulated heads that stand, drift or move, with nothing but their beams: what their sweeps tell, and the map's error.
 
 Tank, basin and harbour; full turns and sectors of 40 to 180 degrees, to and fro; 3 to 30 sweeps; each by its own seed.
-With --map each recording is mapped too. Its errors are those at the ends of sweeps, over their stated deviations; the
-blind side is the direction in which the statement is widest.
+With --map each recording is mapped too. Its errors are those at the ends of sweeps, over their stated deviations, where
+anything is said of the position; the blind side is the direction in which the statement is widest.
 """
 
 from typing import Iterable, List, NamedTuple, Optional
@@ -20,7 +20,7 @@ from node_support.geometry import matrices, wrapped
 from recordings.motion.sweep_shifts import SweepMotion, sweep_shifts
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.rays.ray_caster import RayCaster
+from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
 from sonar_simulator.world.world_file import load_sdf
 
@@ -29,6 +29,7 @@ _STEP, _STEPS = np.radians(1.8), 200
 _SWEEPS = (3, 4, 6, 10, 16, 30)
 _SECTORS = (40, 60, 90, 120, 180, 360)  # degrees
 _FISH, _FISH_SPEED, _FISH_STRENGTH = 8, 0.3, 140.0  # number, m/s, of 255
+_WITHIN = 1.96  # deviations that hold 95 %
 _BUBBLES = 0.02  # share of beams with a cloud of them
 
 
@@ -136,13 +137,15 @@ def _add_fish(strengths: np.ndarray, path: Track, angles: np.ndarray, water: _Wa
 class Errors(NamedTuple):
     """Of the position at the ends of sweeps. far: m, the farthest from where it began. wander: m, of the path told.
 
-    squared: mean of the squared error over what is stated, 1 if that is true. blind: the same of the widest direction.
+    squared: mean of the squared error over what is stated, 1 if that is true, NaN where nothing is. blind: the same of
+    the widest direction. covered: share of errors in that direction within what is stated with 95 %.
     """
 
     far: float
     wander: float
     squared: float
     blind: float
+    covered: float
 
     @classmethod
     def of(cls, mapped: MappedBag, truth: Track) -> "Errors":
@@ -155,7 +158,9 @@ class Errors(NamedTuple):
         stated, sides = np.linalg.eigh(trust.covariances[1:])
         squares = np.einsum("ni,nij->nj", errors, sides) ** 2 / stated
         wander = np.hypot(*(run.best[:, :2] - run.best[0, :2]).T).max()
-        return cls(float(np.hypot(*errors.T).max()), float(wander), float(squares.mean()), float(squares[:, 1].mean()))
+        far, told = float(np.hypot(*errors.T).max()), np.nan if trust.uncertainty is None else 1.0
+        within = told * np.mean(squares[:, 1] <= _WITHIN**2)
+        return cls(far, float(wander), float(told * squares.mean()), float(told * squares[:, 1].mean()), float(within))
 
 
 def mapped_head(head: SimulatedHead) -> MappedBag:
@@ -179,11 +184,17 @@ def _print_errors(heads: List[SimulatedHead], called: List[str]) -> None:
     for name in sorted(set(called)):
         chosen = [head for head, one in zip(heads, called) if one == name]
         found = np.array([Errors.of(mapped_head(head), head.path) for head in chosen])
-        far, wander, squared, blind = np.nanmedian(found, axis=0)
+        far, wander = np.median(found[:, :2], axis=0)
         print(
             f"    called {name:9} error {far:.2f} m median, {found[:, 0].max():.2f} m at most; wander {wander:.2f}, "
-            f"{found[:, 1].max():.2f} m at most; squared error over stated {squared:.2f}, blind side {blind:.2f} "
-            f"(mean {np.nanmean(found[:, 3]):.2f})",
+            f"{found[:, 1].max():.2f} m at most",
+            end="",
+        )
+        of_stated = found[np.isfinite(found[:, 2]), 2:]
+        squared, blind, covered = of_stated.mean(axis=0) if len(of_stated) else np.full(3, np.nan)
+        print(
+            f"; position told of {len(of_stated)}: squared error over stated {squared:.2f}, blind side {blind:.2f}, "
+            f"{covered:.0%} of it covered",
             flush=True,
         )
 

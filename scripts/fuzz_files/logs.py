@@ -93,7 +93,7 @@ def pings_of(path: Path) -> Pings:
 
 
 def _stretch(pings: Pings, rng: np.random.Generator) -> Pings:
-    count = int(rng.choice([1, 3, 6, 9, 30, 150, 400]))
+    count = int(rng.choice([1, 8, 40, 150, 400, 1200]))
     first = int(rng.integers(max(len(pings) - count, 0) + 1))
     return pings[first : first + count]
 

@@ -1,6 +1,7 @@
 """The documentation names only files, folders, headings and messages that exist."""
 
 import re
+from importlib import import_module
 from pathlib import Path
 
 import pytest
@@ -111,6 +112,13 @@ def test_every_benchmark_that_a_page_names_exists(page):
     assert {name.replace("-", "_") for name in named} - {
         name.replace("-", "_") for name in (*SECTIONS, *STUDIES)
     } == set()
+
+
+def test_every_benchmark_can_be_imported():
+    from benchmarks.__main__ import STUDIES
+
+    for study in STUDIES:
+        import_module(f"benchmarks.{study}")
 
 
 def _holds_figures(table):

@@ -217,8 +217,8 @@ class JointSession:
 def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
     """Return scans without points from the newest of node_times (n,) [s] to the beginning of `scan`, n > 0.
 
-    None where that is less than a pause. The last one ends where the scan begins, so that the vehicle's motion within
-    the scan does not hang on that in the pause.
+    None where that is less than a pause. The last one ends where the scan begins, which one without echoes does not
+    tell, so that the vehicle's motion within the scan does not hang on that in the pause.
     """
     if len(node_times) < 2:
         return []
@@ -226,7 +226,8 @@ def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
     count = min(round((scan.start - newest) / usual), _MOST_SCANS)
     if scan.start - newest <= _LONGEST_PAUSE * usual:
         return []
-    return [scan.without_points(float(end)) for end in np.linspace(newest, scan.start, count + 1)[1:]]
+    ends = np.linspace(newest, scan.start, count + 1)[1:].tolist()
+    return [scan.without_points(end) for end in ends if end < scan.reference_time]
 
 
 def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:

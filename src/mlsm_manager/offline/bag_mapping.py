@@ -171,9 +171,11 @@ def _replayed(recording: Recording, scans: List[Scan], parameters: ReplayParamet
 
 
 def _tell_of_refused(replayed: Replayed, options: Namespace) -> None:
-    """Say which scans were left out. Raises RecordingError where no scan is left."""
+    """Say which scans were left out, and where none holds an echo. Raises RecordingError where no scan is left."""
     for reason, count in replayed.refused.items():
         print(f"map_bag: {options.bags[0]}: left out {count} {reason}", file=sys.stderr)
+    if not any(map(len, replayed.scans)):
+        print(f"map_bag: {options.bags[0]}: the map is empty: no echo stands out of what is heard", file=sys.stderr)
     if not replayed.updates:
         raise RecordingError(f"{options.bags[0]}: not one of {sum(replayed.refused.values())} scans could be used")
 

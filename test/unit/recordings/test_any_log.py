@@ -15,12 +15,12 @@ TICK, HALF_SOUND = 25e-9, 750.0  # s, m/s
 SAMPLES = 400
 
 
-def sent(gradians, reach, gain, generator):
+def sent(gradians, reach, gain, generator, is_silent=False):
     """Return what a Ping360 sends of the room in one direction."""
     length = reach / SAMPLES
-    strengths = generator.exponential(4.0, SAMPLES)
+    strengths = generator.exponential(4.0, SAMPLES) * (not is_silent)
     first = int(distance(np.zeros(2), (200 - gradians) * np.pi / 200.0) / length)
-    strengths[first : first + max(round(0.3 / length), 2)] += 120.0
+    strengths[first : first + max(round(0.3 / length), 2)] += 120.0 * (not is_silent)
     data = np.minimum(strengths, 255.0).astype(np.uint8).tobytes()
     return packed(
         MessageId.DEVICE_DATA, mode=1, gain_setting=gain, angle=int(gradians) % 400, transmit_duration=32,
@@ -29,11 +29,12 @@ def sent(gradians, reach, gain, generator):
     )  # fmt: skip
 
 
-def written(path, parts):
-    """Write a log, in Persian, of (gradians, range [m], gain) ten times a second."""
+def written(path, parts, pause=0.0, is_silent=False):
+    """Write a log, in Persian, of (gradians, range [m], gain) ten times a second, with a pause [s] in the middle."""
     generator = np.random.default_rng(3)
-    times = (text_bytes(clock(1.0 + 0.1 * index).translate(PERSIAN)) for index in range(len(parts)))
-    messages = (sent(*part, generator) for part in parts)
+    seconds = (1.0 + 0.1 * index + pause * (2 * index >= len(parts)) for index in range(len(parts)))
+    times = (text_bytes(clock(one).translate(PERSIAN)) for one in seconds)
+    messages = (sent(*part, generator, is_silent) for part in parts)
     body = b"".join(time + len(data).to_bytes(4, "big") + data for time, data in zip(times, messages))
     path.write_bytes(log_bytes([]) + body)
     return path
@@ -81,3 +82,10 @@ def test_sectors_to_and_fro_give_a_map_and_nothing_that_was_not_measured_is_fine
     if summary["odometry"]["profile"] != "standing" or sweeps < 4:
         assert "NOT MEASURED" in summary["trust"]
         assert summary["deviation_per_minute"] == [None]
+
+
+def test_sweeps_without_an_echo_and_a_pause_give_an_empty_map_that_says_so(tmp_path, capsys):
+    path = written(tmp_path / "log.bin", [(one, 15.0, 1) for one in range(100, 180)], pause=300.0, is_silent=True)
+    places, summary = mapped(path, tmp_path)
+    assert (len(places), summary["scans"], summary["left_out"]) == (0, 2, {})
+    assert "the map is empty" in capsys.readouterr().err
