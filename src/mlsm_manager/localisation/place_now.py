@@ -86,13 +86,16 @@ class FixAge:
 
 
 def doubts_of(
-    place: Optional[PlaceNow], causes: Sequence[Cause], verdicts: Sequence[Verdict], silent: Mapping[str, float]
-) -> List[str]:
+    place: Optional[PlaceNow], causes: Sequence[Cause], verdicts: Sequence[Verdict], silent: Mapping[str, float],
+    odometry: str,
+) -> List[str]:  # fmt: skip
     """Return what speaks against a position, the worst first.
 
-    causes: ranked. silent: seconds for which a topic that is needed did not come.
+    causes: ranked. silent: seconds for which a topic that is needed did not come; odometry: that of them which is not
+    the sonar's.
     """
-    said = [f"nothing on {topic} for {seconds:.0f} s" for topic, seconds in silent.items()]
+    parts = (("odometry" if topic == odometry else "sonar", topic, seconds) for topic, seconds in silent.items())
+    said = [f"{part} silent for {seconds:.0f} s (nothing on {topic})" for part, topic, seconds in parts]
     if place is not None:
         said = said or ([f"no fix for {place.age:.0f} s"] if place.overdue > 0.0 else [])
         # A fault that was left out is over once scans show the place again.

@@ -21,6 +21,8 @@ class OdometryTrack:
     def __init__(self, odom_frame: str, base_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frames = odom_frame, base_frame
+        self.name = f"tf of {odom_frame} -> {base_frame}"
+        """As which its silence is told."""
         self._health = health
         self._newest_ns = 0
         self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, parent=odom_frame)
@@ -78,7 +80,7 @@ class OdometryTrack:
         stamp_ns, matrix = found
         if stamp_ns != self._newest_ns:
             self._newest_ns = stamp_ns
-            self._health.heard("tf of {} -> {}".format(*self._frames))
+            self._health.heard(self.name)
         return (stamp_ns * 1e-9 if stamp_ns else None), matrix
 
     def _pose(self, time: float) -> Optional[np.ndarray]:

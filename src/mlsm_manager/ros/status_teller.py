@@ -32,11 +32,16 @@ _COLORS = {
     PositionState.DOUBTFUL: _AMBER,
     PositionState.UNKNOWN: ColorRGBA(1.0, 0.3, 0.25, 1.0),
 }
-_WHITE = ColorRGBA(0.9, 0.92, 0.95, 1.0)
+_WHITE, _GREY = ColorRGBA(0.9, 0.92, 0.95, 1.0), ColorRGBA(0.6, 0.65, 0.7, 0.7)
 _SHARE = 20.0  # of how far the sonar hears: the height of a letter, from which all else follows
 _MOST = 2.5  # m, of a letter: larger ones hide the map
-_LINE, _VEHICLE, _ABOVE = 0.08, 2.0, 1.5  # letters: width of a line, length of the vehicle's arrow, height over it
+_LINE, _THIN = 0.08, 0.03  # letters: width of a line, and of one of the grid
+_VEHICLE, _ABOVE = 2.0, 1.5  # letters: length of the vehicle's arrow, height over it
 _ASIDE = (-6.0, -7.0)  # letters from the vehicle, where scale bar and north arrow begin
+_GRID, _LABELS = (
+    30.0,
+    (18.0, 12.0),
+)  # letters from the vehicle: where lines of the grid end, and where they are labelled
 _BARS = (0.1, 1.0, 10.0)  # m: the longest one that eight letters hold is drawn
 _WITHIN = float(np.sqrt(-2.0 * np.log(0.05)))  # deviations of a plane's ellipse that holds 95 %
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
@@ -81,7 +86,7 @@ class StatusTeller:
         report_causes(self._health, causes)
         stages = (*self.stages_before, self._health)
         silent = {topic: seconds for stage in stages for topic, seconds in stage.silent().items()}
-        doubts = doubts_of(place, causes, self.verdicts, silent)
+        doubts = doubts_of(place, causes, self.verdicts, silent, self._odometry.name)
         state, text = position_state(place, self._localiser.is_lost, self.is_provisional, doubts)
         self._health.show("position", text)
         if T_map_base is not None:
@@ -116,21 +121,50 @@ class StatusTeller:
             self._pose.publish(told)
             self._chart.tell(place, planar(T_map_base), state)
         if self._markers.get_num_connections():
-            made = _Maker(self._map_frame, T_map_base[:3, 3], self._letter or _MOST)
-            self._markers.publish(MarkerArray(status_markers(made, status, T_map_base[:2, 0])))
+            letter = self._letter or _MOST
+            self._markers.publish(MarkerArray(status_markers(status, T_map_base, letter, self._map_frame)))
 
 
-def status_markers(made: "_Maker", status: PositionStatus, ahead: np.ndarray) -> List[Marker]:
-    """Return status text, vehicle, scale bar, north arrow and ellipse; all but the ellipse stand in letters.
+def status_markers(status: PositionStatus, T_map_base: np.ndarray, letter: float, frame: str) -> List[Marker]:
+    """Return what is drawn in place of all before: a grid at the vehicle's depth, its labels and the status over it.
 
-    ahead: (2,) where the vehicle looks, of length 1.
+    letter: m, the height of one, in which all but the ellipse and the distances of lines are measured.
+    """
+    length = max([bar for bar in _BARS if bar <= 8.0 * letter], default=_BARS[0])
+    place, over = T_map_base[:3, 3], np.array([0.0, 0.0, _ABOVE * letter])
+    below, above = _Maker(frame, "grid", place, letter), _Maker(frame, "status", place + over, letter)
+    drawn = [*_grid(below, above, place[:2], length), *_status(above, status, T_map_base[:2, 0], length)]
+    return [Marker(header=Header(frame_id=frame), action=Marker.DELETEALL), *drawn]
+
+
+def _grid(below: "_Maker", above: "_Maker", vehicle: np.ndarray, step: float) -> List[Marker]:
+    """Return lines of the map's x and y each `step` metres, and above the map what x and y they are."""
+    letter = below.letter
+    low, high = (step * np.round((vehicle + way * np.multiply(_LABELS, letter)) / step) for way in (-1.0, 1.0))
+    end, ends, labels = _GRID * letter, [], []
+    for axis in (0, 1):
+        first, last = np.ceil((vehicle[axis] - end) / step), np.floor((vehicle[axis] + end) / step)
+        for value in step * np.arange(first, last + 1.0) + 0.0:
+            line = np.array([[-end, -end], [end, end]])
+            line[:, axis] = value - vehicle[axis]
+            ends.append(line)
+            if low[axis] < value <= high[axis]:
+                place = np.where(np.arange(2) == axis, value, low) - vehicle
+                labels.append(above.text(f"{value:.{int(step < 1.0)}f}", place, _GREY))
+    return [below.line(np.concatenate(ends), _GREY, kind=Marker.LINE_LIST, width=_THIN), *labels]
+
+
+def _status(made: "_Maker", status: PositionStatus, ahead: np.ndarray, length: float) -> List[Marker]:
+    """Return status text, vehicle, scale bar, north arrow and ellipse.
+
+    ahead: (2,) where the vehicle looks, of length 1. length: m, of the scale bar.
     """
     color, letter = _COLORS[PositionState(status.state)], made.letter
-    length = max([bar for bar in _BARS if bar <= 8.0 * letter], default=_BARS[0])
     half, origin = np.multiply(ahead, _VEHICLE * letter / 2.0), np.multiply(_ASIDE, letter)
     bar, north = (np.array([origin, np.add(origin, way)]) for way in ((length, 0.0), (0.0, 2.5 * letter)))
+    fix = f"\nfix {status.age:.0f} s ago" if np.isfinite(status.age) else ""
     markers = [
-        made.text(wrapped_text(status.text), np.array([0.0, 2.5 * letter]), color),
+        made.text(wrapped_text(status.text) + fix, np.array([0.0, 2.5 * letter]), color),
         made.arrow(np.array([-half, half]), color),
         made.line(bar, _WHITE),
         made.text(f"{length:g} m", np.add(bar[1], (1.2 * letter, 0.0)), _WHITE),
@@ -157,16 +191,15 @@ def wrapped_text(text: str) -> str:
 
 
 class _Maker:
-    """Makes markers over one place in the map, numbered as they are made; letter: m, the height of one."""
+    """Makes markers of one name around a place (3,) in the map, numbered as they are made; letter: m, height of one."""
 
-    def __init__(self, frame: str, vehicle: np.ndarray, letter: float) -> None:
-        self._frame, self._number, self.letter = frame, 0, letter
-        self._origin = np.add(vehicle, (0.0, 0.0, _ABOVE * letter))
+    def __init__(self, frame: str, name: str, origin: np.ndarray, letter: float) -> None:
+        self._frame, self._name, self._origin, self._number, self.letter = frame, name, origin, 0, letter
 
     def _marker(self, kind: int, color: ColorRGBA) -> Marker:
         self._number += 1
         # Stamp 0: shown at once, also where rviz has the newest transforms of map a moment later.
-        marker = Marker(header=Header(frame_id=self._frame), ns="status", id=self._number, type=kind, color=color)
+        marker = Marker(header=Header(frame_id=self._frame), ns=self._name, id=self._number, type=kind, color=color)
         marker.pose.orientation.w = 1.0
         return marker
 
@@ -181,10 +214,10 @@ class _Maker:
         (marker.pose.position,) = self._points([place])
         return marker
 
-    def line(self, places: np.ndarray, color: ColorRGBA) -> Marker:
-        """Return a line along places (n, 2) [m] from the origin."""
-        marker = self._marker(Marker.LINE_STRIP, color)
-        marker.scale.x, marker.points = _LINE * self.letter, self._points(places)
+    def line(self, places: np.ndarray, color: ColorRGBA, kind: int = Marker.LINE_STRIP, width: float = _LINE) -> Marker:
+        """Return a line along places (n, 2) [m] from the origin; of LINE_LIST one between each two."""
+        marker = self._marker(kind, color)
+        marker.scale.x, marker.points = width * self.letter, self._points(places)
         return marker
 
     def arrow(self, ends: Sequence[np.ndarray], color: ColorRGBA) -> Marker:

@@ -263,6 +263,7 @@ def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lo
 
 JUMP = Cause("odometry jumped by 30.0 m", 1e3, 88.0, is_mended=True, metres=0.5)
 TURNED = Cause("the sonar is turned by 20 deg", 40.0)
+ODOMETRY = "tf of odom -> base_link"
 SMEARED = Verdict("scans on the map", 0.2, 0.5, "scans beside the map", more_is_better=True)
 
 
@@ -274,13 +275,13 @@ SMEARED = Verdict("scans on the map", 0.2, 0.5, "scans beside the map", more_is_
         (0.0, [replace(JUMP, begin=20.0)], [], {}, []),
         (0.0, [TURNED], [SMEARED], {}, [TURNED.text, SMEARED.text]),
         (3.0, [TURNED], [], {}, ["no fix for 30 s", TURNED.text]),
-        (3.0, [], [], {"/sonar/raw": 28.0}, ["nothing on /sonar/raw for 28 s"]),
-        (None, [], [], {"/sonar/raw": 12.0}, ["nothing on /sonar/raw for 12 s"]),
+        (3.0, [], [], {"/sonar/raw": 28.0}, ["sonar silent for 28 s (nothing on /sonar/raw)"]),
+        (None, [], [], {ODOMETRY: 12.0}, [f"odometry silent for 12 s (nothing on {ODOMETRY})"]),
     ],
 )
 def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes, verdicts, silent, said):
     place = None if overdue is None else PlaceNow(100.0, 30.0, overdue, np.eye(3), 5)
-    doubts = doubts_of(place, causes, verdicts, silent)
+    doubts = doubts_of(place, causes, verdicts, silent, ODOMETRY)
     assert doubts == said
     assert all(doubt in position_state(place, False, False, doubts)[1] for doubt in said)
 

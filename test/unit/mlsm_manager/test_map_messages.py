@@ -19,10 +19,11 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.ros.map_publisher import CLOUD_FIELDS, has_octomap_messages, map_cloud, octomap_message
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
-from mlsm_manager.ros.status_teller import ellipse, wrapped_text
+from mlsm_manager.ros.status_teller import ellipse, status_markers, wrapped_text
 from mlsm_manager.surface_map.cells import THINNEST, TILE_BITS, box_lists, box_size, box_type
 from mlsm_manager.surface_map.export.formats import octree, write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
+from underwater_map_construction.msg import PositionStatus
 
 HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
 MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.9), (5.0, 5.01)]
@@ -255,7 +256,35 @@ def test_the_ellipse_of_a_position_holds_it_with_95_percent():
 
 
 def test_a_long_status_is_wrapped_between_words():
-    text = "position doubtful, 0.4 m: " + "nothing on /sonar/raw for 12 s; " * 3
+    text = "position doubtful, 0.4 m: " + "sonar silent for 12 s (nothing on /sonar/raw); " * 3
     lines = wrapped_text(text).split("\n")
     assert max(map(len, lines)) <= 52
     assert " ".join(lines) == text.strip()
+
+
+@pytest.fixture
+def drawn():
+    status = PositionStatus(state=PositionStatus.GOOD, text="position good, 0.4 m", age=14.2)
+    status.covariance = np.eye(3).ravel()
+    T_map_base = np.eye(4)
+    T_map_base[:3, 3] = 3.0, -48.0, -2.0
+    return status_markers(status, T_map_base, 2.5, "map")
+
+
+def test_the_status_at_the_vehicle_tells_the_age_of_the_fix_and_replaces_the_one_before(drawn):
+    assert drawn[0].action == Marker.DELETEALL
+    assert "position good, 0.4 m\nfix 14 s ago" in [marker.text for marker in drawn]
+    assert len({(marker.ns, marker.id) for marker in drawn}) == len(drawn)
+
+
+def test_each_label_of_the_grid_tells_the_x_or_the_y_of_its_line(drawn):
+    labels = [marker for marker in drawn if marker.text.lstrip("-").isdigit()]
+    told = np.array([float(marker.text) for marker in labels])
+    places = np.array([(marker.pose.position.x, marker.pose.position.y) for marker in labels])
+    of_x = places[:, 1] == -80.0
+    np.testing.assert_allclose(told[of_x], np.arange(-30.0, 51.0, 10.0))
+    np.testing.assert_allclose(places[of_x, 0], told[of_x])
+    np.testing.assert_allclose(told[~of_x], np.arange(-70.0, -19.0, 10.0))
+    np.testing.assert_allclose(places[~of_x], [(-40.0, value) for value in told[~of_x]])
+    (lines,) = (marker for marker in drawn if marker.type == Marker.LINE_LIST)
+    assert {point.z for point in lines.points} == {-2.0}
