@@ -10,6 +10,7 @@ from typing import Callable, Dict, List
 
 import numpy as np
 
+from georeferencing.origin import STORED
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.formats import ENDINGS, GEOTIFF, ExportOptions, export
 from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
@@ -49,7 +50,11 @@ def info_lines(path: Path, stored: StoredMap) -> List[str]:
     lines += [f"  mark: {mark.name!r} at {mark.x:.1f}, {mark.y:.1f} m" for mark in stored.marks]
     lines += [f"  calibration: {name} = {value}" for name, value in sorted(stored.calibration.items())]
     lines += [] if stored.origin is None else [f"  origin: {stored.origin}"]
-    lines += [f"  with {name} {'x'.join(map(str, array.shape))}" for name, array in sorted(stored.arrays.items())]
+    lines += [
+        f"  with {name} {'x'.join(map(str, array.shape))}"
+        for name, array in sorted(stored.arrays.items())
+        if name != STORED
+    ]
     return lines
 
 
