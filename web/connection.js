@@ -1,7 +1,7 @@
 // The link to the vehicle: messages in, requests out. src/web_page/messages.py writes and reads the same.
 
 const SILENT = 3000;  // ms without a message: the link is cut
-const OPENING = 5000;  // ms until an attempt is given up
+const PATIENCE = 6000;  // ms without one, or until an attempt opens: it is tried anew; a full link takes some of them
 const RETRY = 1000;   // ms between two attempts
 const TURN = 65536;   // steps of an angle of 16 bits
 
@@ -54,7 +54,10 @@ export class Connection {
     const socket = this.socket = new WebSocket(url);
     this.opened = performance.now();
     socket.binaryType = "arraybuffer";
-    socket.onopen = () => this.send({ hello: this.known() });
+    socket.onopen = () => {
+      this.opened = performance.now();
+      this.send({ hello: this.known() });
+    };
     socket.onmessage = (event) => { if (socket === this.socket) this.read(event.data); };
     socket.onclose = (event) => { this.refused = event.reason || ""; };
   }
@@ -71,8 +74,7 @@ export class Connection {
 
   watch() {
     const waited = performance.now() - Math.max(this.opened, this.heard);
-    const patience = this.socket.readyState === WebSocket.CONNECTING ? OPENING : SILENT;
-    if (this.socket.readyState < WebSocket.CLOSING && waited < patience) return;
+    if (this.socket.readyState < WebSocket.CLOSING && waited < PATIENCE) return;
     const old = this.socket;
     this.socket = null;
     old.onclose = null;
