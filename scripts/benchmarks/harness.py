@@ -69,6 +69,11 @@ cpu_seconds = partial(median_seconds, repeats=1, clock=time.process_time)
 """Returns the seconds of a core that a call takes."""
 
 
+def say(words: str) -> None:
+    """Tell beside the table what is done now, so that whoever waits knows for what."""
+    print(f"{time.strftime('%H:%M:%S')} {words}", file=sys.stderr, flush=True)
+
+
 def print_table(rows: List[Row]) -> None:
     """Print rows in columns under a heading."""
     lines = [("figure", "measured", "wanted"), *rows]

@@ -32,13 +32,13 @@ from benchmarks.cable import (
     versions,
     wait_for,
 )
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table
+from benchmarks.harness import ROOT, Row, benchmark_parser, print_table, say
 from benchmarks.web import HELLO, chromium, first_picture
 
-_GROWN = 90.0  # s of mapping before the page is opened
-_CUTS = (("unplugged", True), ("all lost", False)) * 2
+_GROWN = 60.0  # s of mapping before the page is opened
+_CUTS = ("unplugged", True), ("all lost", False)
 _CUT, _WHOLE = 25.0, 10.0  # s: how long nothing is carried, and until the page shall be whole again
-_BETWEEN = 30.0  # s
+_BETWEEN = 20.0  # s
 _NEAR, _FAR = "--near", "--far"
 _NOW, _TILE = "now", 1  # what is not a tile, and the kind of those that are
 # Adler-32, as zlib has it, of every binary message, with its time.
@@ -71,13 +71,16 @@ def measured(seconds: float, kilobits: int, thin_link: bool) -> List[Row]:
         if thin_link:
             programs.start("roslaunch", "--wait", PACKAGE, "thin_link.launch")
             programs.start(*cable.far_end, *link.LISTENER, "thin/MLSM/Markers", seen, ROS_IP=TOPSIDE)
+        say(f"the vehicle maps for {_GROWN:g} s before the page is opened")
         time.sleep(_GROWN)
         programs.start(*cable.far_end, *_program(_FAR), port, came, first)
         wait_for(came)
+        say(f"the page is open: measuring for {seconds:g} s")
         before, begin = cable.sent_bytes, time.time()
         time.sleep(seconds)
         rate, cuts = (cable.sent_bytes - before) / (time.time() - begin), []
         for name, unplugged in _CUTS:
+            say(f"{name} for {_CUT:g} s, then {_BETWEEN:g} s to become whole")
             cuts.append((name, *cable.cut(_CUT, unplugged)))
             time.sleep(_BETWEEN)
         found = versions(made), versions(came)
@@ -152,7 +155,7 @@ def main() -> None:
             _far(*sys.argv[2:])
         return
     parser = benchmark_parser("page_link", __doc__)
-    parser.add_argument("--seconds", type=float, default=120.0, help="how long to measure before the cable is cut")
+    parser.add_argument("--seconds", type=float, default=60.0, help="how long to measure before the cable is cut")
     parser.add_argument("--kilobits", type=int, default=256, help="that the link carries in a second")
     parser.add_argument("--thin-link", action="store_true", help="send rviz the map through the same cable")
     options = parser.parse_args()

@@ -18,13 +18,13 @@ from typing import Any, Dict, Iterator, List, Tuple
 import numpy as np
 from tornado.websocket import websocket_connect
 
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table
+from benchmarks.harness import ROOT, Row, benchmark_parser, print_table, say
 
 _PAGES = 10
 HELLO = json.dumps({"hello": {"run": "", "revision": 0}})
 """With which a page begins that has nothing yet."""
 _PATIENCE = 180.0  # s until the graph runs
-_WARM_UP = 60.0  # s: some scans are matched
+_WARM_UP = 40.0  # s: some scans are matched
 _REVOLUTION = 20.0  # s until all beams of one have come
 _TURNS = ("without the node", "no page", f"{_PAGES} pages")
 _STAGES = {"sonar_to_cloud": "messages in", "echo_extractor": "clouds in"}
@@ -50,9 +50,11 @@ def measured(seconds: float, rounds: int) -> List[Row]:
     try:
         figures = Figures()
         figures.wait()
+        say(f"the vehicle maps for {_WARM_UP:g} s first")
         time.sleep(_WARM_UP)
         turns, rates, first = [], [], np.nan
         for number in range(rounds):
+            say(f"round {number + 1} of {rounds}: {seconds:g} s each of {', '.join(_TURNS)}")
             turns.append([figures.over(seconds)])
             with _page_node(port):
                 if number == 0:
@@ -223,8 +225,8 @@ def _pid(node: str) -> int:
 def main() -> None:
     """Print the table."""
     parser = benchmark_parser("web", __doc__)
-    parser.add_argument("--seconds", type=float, default=45.0, help="of each turn")
-    parser.add_argument("--rounds", type=int, default=4, help="of the three turns")
+    parser.add_argument("--seconds", type=float, default=30.0, help="of each turn")
+    parser.add_argument("--rounds", type=int, default=2, help="of the three turns")
     options = parser.parse_args()
     print_table(measured(options.seconds, options.rounds))
 
