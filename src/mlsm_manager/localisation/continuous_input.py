@@ -6,12 +6,18 @@ import numpy as np
 
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.odometry.steps import ContinuousOdometry
+from mlsm_manager.odometry.trembling import with_headings_smoothed
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry import transformed
+from node_support.geometry import composed, inverse, transformed
 
 
 def continuous_scan(odometry: ContinuousOdometry, scan: Scan) -> Scan:
-    """Learn a scan's odometry, and return the scan with one that goes on."""
+    """Learn a scan's odometry, and return the scan with one that goes on, and whose headings do not tremble."""
+    smooth, trembling = with_headings_smoothed(scan.track)
+    if trembling:
+        odometry.trembling = odometry.trembling or trembling
+        moves = composed(smooth.at(scan.times), inverse(scan.track.at(scan.times)))
+        scan = replace(scan, points=transformed(moves, scan.points), track=smooth)
     odometry.take(scan.track)
     if not odometry.steps:
         return scan

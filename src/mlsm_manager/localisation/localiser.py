@@ -154,7 +154,7 @@ class Localiser:
                 self._causes.take(scan, update.belief.theta[POSE])
             if update.accepted and update.result is not None:
                 self._age.learn_fix(scan.reference_time)
-                added = self._causes.covariance(self.steps)
+                added = self._causes.covariance(self._wrong)
                 update = replace(update, result=update.result.widened(added))
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
@@ -207,7 +207,7 @@ class Localiser:
             pose, belief = composed(self._odometry.fixes(np.array(time)), odometry), self.estimator.belief
             if belief is None:
                 return None
-            return self._age.place_at(time, pose, belief, self.estimator.errors, self._causes.covariance(self.steps))
+            return self._age.place_at(time, pose, belief, self.estimator.errors, self._causes.covariance(self._wrong))
 
     def look_for_causes(self) -> None:
         """Look for what is wrong where new scans may show it, which takes most of a second.
@@ -218,7 +218,11 @@ class Localiser:
 
     def causes(self) -> List[Cause]:
         """Return what was found to be wrong, ranked."""
-        return self._causes.causes(self.steps)
+        return self._causes.causes(self._wrong)
+
+    @property
+    def _wrong(self) -> Sequence[Step]:
+        return [*self._odometry.trembling, *self.steps]
 
     @property
     def steps(self) -> Sequence[Step]:

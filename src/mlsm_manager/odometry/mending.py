@@ -1,48 +1,73 @@
-"""A recorded odometry mended where it says of itself that it was wrong: held poses, steps of compass and position."""
+"""A recorded odometry mended where it says of itself that it was wrong: held poses, steps of compass and position, and
+headings that tremble.
+"""
 
 from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
 from mlsm_manager.odometry.steps import LEAST_STEP, ContinuousOdometry, MotionLimits, Step, StepKind, impossible_steps
+from mlsm_manager.odometry.trembling import with_headings_smoothed
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import rotated, wrapped
 
+_YAW = 2  # column of poses
 _STANDS_FOR = 10.0  # s of equal poses: longer than any odometry waits between two of them
 _COURSE = 20.0  # s before and after a step in which the vehicle shows which way it goes against its heading
 _GOES = 1.0  # m in these: less does not tell a course
 _FOLLOWS = 0.5  # share of a step of the heading, halfway between a course that turns against it and one that does not
+_TURNS = 200  # between poses, that show whether a heading is measured
+_TO_AND_FRO = 0.1  # share of neighbouring turns of a measured heading that have opposite signs
 
 
 class Mended(NamedTuple):
     """track: without what no vehicle does. steps: that were left out. held: s, beginnings and ends of poses that were
-    held until they jumped to where the vehicle was.
+    held until they jumped to where the vehicle was. stuck: s, likewise, of headings; they stay.
     """
 
     track: Track
     steps: List[Step]
     held: List[Tuple[float, float]]
+    stuck: List[Tuple[float, float]]
 
 
 def mended(track: Track, limits: MotionLimits) -> Mended:
     """Return a track that a vehicle can have gone, and what was mended."""
+    stuck = stuck_headings(track)
+    track, trembling = with_headings_smoothed(track)
     track, held = _with_holds_bridged(track, limits)
     track, compass = _with_headings_mended(track, limits)
     odometry = ContinuousOdometry(limits)
     odometry.take(track)
-    steps = sorted([*compass, *odometry.steps], key=lambda step: step.time)
-    return Mended(odometry.followed(track), steps, held)
+    steps = sorted([*trembling, *compass, *odometry.steps], key=lambda step: step.time)
+    return Mended(odometry.followed(track), steps, held, stuck)
 
 
-def standing_stretches(track: Track) -> Iterator[Tuple[int, int]]:
+def standing_stretches(track: Track, first_column: int = 0) -> Iterator[Tuple[int, int]]:
     """Yield first and last number of stretches of ten seconds or more in which the pose does not change at all.
 
     A heading that is measured trembles, so that a pose stands only where nobody measures it, or in a simulation.
+    first_column: 2 for stretches in which the heading does not change.
     """
-    same = np.concatenate([[False], (np.diff(track.poses, axis=0) == 0.0).all(axis=1), [False]])
+    same = np.concatenate([[False], (np.diff(track.poses[:, first_column:], axis=0) == 0.0).all(axis=1), [False]])
     for first, last in np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2):
         if track.times[last] - track.times[first] >= _STANDS_FOR:
             yield int(first), int(last)
+
+
+def stuck_headings(track: Track) -> List[Tuple[float, float]]:
+    """Return when [s] the heading stood while positions went on, if it trembles elsewhere as measured ones do."""
+    stretches, stuck = list(standing_stretches(track, _YAW)), np.zeros(len(track.times) - 1, dtype=bool)
+    for first, last in stretches:
+        stuck[first:last] = True
+    turns = np.sign(np.diff(track.poses[:, _YAW]))[~stuck]
+    if len(turns) < _TURNS or np.mean(turns[1:] * turns[:-1] < 0.0) < _TO_AND_FRO:
+        return []
+    return [
+        (float(track.times[first]), float(track.times[last]))
+        for first, last in stretches
+        if np.hypot(*np.ptp(track.poses[first : last + 1, :2], axis=0)) > _GOES
+    ]
 
 
 def _with_holds_bridged(track: Track, limits: MotionLimits) -> Tuple[Track, List[Tuple[float, float]]]:

@@ -39,11 +39,12 @@ class MotionLimits(ParameterSet):
 
 
 class StepKind(Enum):
-    """What an impossible step looks like."""
+    """What an impossible step looks like; headings that tremble take many."""
 
     JUMPED = "odometry jumped by {size:.1f} m"
     RESTARTED = "odometry started again from zero, {size:.1f} m off"
     COMPASS = "compass stepped by {turn:.0f} deg"
+    TREMBLES = "the compass trembles by about {turn:.0f} deg"
     STALLED = "odometry stalled, and missed {size:.1f} m and {turn:.0f} deg"
 
 
@@ -73,7 +74,7 @@ class ContinuousOdometry:
     after a step hang together as they were reported. While the odometry stalls it goes on likewise. What it reports at
     once after its clock has stood is no step.
 
-    stood: from when to when [s] its stamps went on after they had stood.
+    stood: from when to when [s] its stamps went on after they had stood. trembling: of headings, at most one.
 
     Safe to use from several threads: one gives it scans, another asks for what holds now.
     """
@@ -87,6 +88,7 @@ class ContinuousOdometry:
     def clear(self) -> None:
         """Forget everything, because time jumped."""
         self.steps: List[Step] = []
+        self.trembling: List[Step] = []
         self._begins: List[float] = []
         self._starts = [-np.inf]
         self._fixes = [np.zeros(3)]

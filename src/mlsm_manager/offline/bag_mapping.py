@@ -24,7 +24,8 @@ from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_cells, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
-from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, ranked
+from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck, ranked
+from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings
 from mlsm_manager.self_check.hypotheses import AS_TOLD
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -69,7 +70,8 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
     odometry = _odometry(recording, options)
-    recording = recording.corrected(options.parameters.part(BeamCorrection))
+    beams, companions = without_companions(recording.beams, recording.track)
+    recording = replace(recording, beams=beams).corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
     recording, scans, mounted = _heard(recording, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
@@ -93,7 +95,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     if refined is not None:
         of_echoes = refined.motion.told_with(of_echoes)
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
-    causes = ranked([*causes, *of_echoes, *of_beams])
+    causes = ranked([*causes, *companions, *of_echoes, *of_beams])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))
@@ -229,8 +231,8 @@ def _run(
 
 def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:
     """Return a recording whose odometry goes where a vehicle can have gone, and what was wrong with it."""
-    track, steps, held = mended(recording.track, limits)
-    causes = of_steps(steps)
+    track, steps, held, stuck = mended(recording.track, limits)
+    causes = [*of_steps(steps), *(of_stuck(*one) for one in stuck)]
     causes += [
         Cause(f"odometry held for {end - begin:.0f} s, and then right again,", CERTAIN, begin, True)
         for begin, end in held

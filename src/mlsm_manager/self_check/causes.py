@@ -57,6 +57,11 @@ def of_steps(steps: Sequence[Step]) -> List[Cause]:
     return [cause for of_kind in kinds for cause in _of_kind(of_kind)]
 
 
+def of_stuck(begin: float, end: float) -> Cause:
+    """Return the cause for a heading that stood from `begin` to `end` [s] while the vehicle went on."""
+    return Cause(f"the compass stuck for {end - begin:.0f} s", CERTAIN, begin, turn=np.pi / 2.0)
+
+
 def _of_kind(steps: List[Step]) -> List[Cause]:
     groups = [[step] for step in steps] if len(steps) <= _FEW else [steps]
     return [_of_step(group) for group in groups]

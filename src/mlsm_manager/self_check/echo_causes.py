@@ -8,14 +8,15 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
 from mlsm_manager.self_check.causes import Cause, ranked
-from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
+from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
 _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
 _DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
 _SLIP_TOLD = np.radians(12.0)  # three deviations of a compass that turns quickly, or in a gap of the odometry
-_SLIPS = np.radians(np.arange(-60.0, 61.0, 4.0))
+_SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0, 4.0))]
+_RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-5.0, 6.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
 # Nats from which on a cause is named: one in a hundred runs has it, and 95 % are asked for. Besides, the more causes
@@ -44,9 +45,9 @@ def echo_findings(
     honest, best, tried = pairs.honest, *_turned(pairs)
     nats = pairs.evidence(best, honest) - np.log(tried)
     if nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD):
-        turn = TURN_DEVIATION if best.is_over else abs(best.turn)
+        turn = np.pi if best.is_over else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(_turn_text(best), nats, turn=turn)], best)
-    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_slipped(pairs), *carried(pairs, _NATS)]
+    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, _NATS)]
     return EchoFindings(ranked(found), AS_TOLD)
 
 
@@ -97,9 +98,9 @@ def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     return [Cause(text, nats, metres=size)]
 
 
-def _slipped(pairs: ScanPairs) -> List[Cause]:
-    """Return whether scans lie turned on those before a moment, and not on those after it."""
-    near, found = pairs.near(), []
+def _changed(pairs: ScanPairs) -> List[Cause]:
+    """Return whether scans lie turned, or larger or smaller, on those before a moment, and not on those after it."""
+    near, found, changes = pairs.near(), [], [*_SLIPS, *_RANGES]
     for number, begin in enumerate(near.begins):
         across, before = (near.pairs[:, 0] < number) & (near.pairs[:, 1] >= number), near.pairs[:, 1] < number
         if across.sum() < _FEWEST_SLIPPED or before.sum() < _FEWEST_BEFORE:
@@ -107,11 +108,19 @@ def _slipped(pairs: ScanPairs) -> List[Cause]:
         apart, alike = near.distances[across], near.distances[before]
         if apart.mean() < _FARTHER * alike.mean():
             continue
-        table = pairs.turned(near.pairs[across], _SLIPS)
+        table = pairs.changed(near.pairs[across], changes)
         row = int(table.mean(axis=1).argmin())
         nats = evidence_of(apart, table[row], len(np.unique(near.pairs[across, 1])), alike)
-        nats -= np.log(len(near.begins) * len(_SLIPS))
-        if nats > _NATS and abs(_SLIPS[row]) > _SLIP_TOLD:
-            fault = MotionFault(FaultKind.SLIP, float(begin), (float(_SLIPS[row]),))
-            found.append(Cause(fault.text, nats, fault.begin, turn=abs(_SLIPS[row]), fault=fault))
+        nats -= np.log(len(near.begins) * len(changes))
+        if nats > _NATS and (changes[row].ranges != 1.0 or abs(changes[row].turn) > _SLIP_TOLD):
+            found.append(_of_change(changes[row], float(begin), nats, pairs.typical_range()))
     return ranked(found)[:1]
+
+
+def _of_change(change: Change, begin: float, nats: float, usual: float) -> Cause:
+    """Return the cause for a change of the head or of its setting; usual: m, range of echoes."""
+    if change.ranges == 1.0:
+        fault = MotionFault(FaultKind.SLIP, begin, (change.turn,))
+        return Cause(fault.text, nats, begin, turn=abs(change.turn), fault=fault)
+    text = f"the range setting changed untold: reported ranges are {1.0 / change.ranges:.2f} times the true ones"
+    return Cause(text, nats, begin, metres=abs(1.0 - change.ranges) * usual)

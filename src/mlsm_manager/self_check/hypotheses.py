@@ -150,16 +150,28 @@ class ScanPairs:
             return velocity
         return rotated(velocity[np.newaxis], -self._corrections.at(np.array([time]))[:, 2])[0]
 
-    def turned(self, pairs: np.ndarray, turns: np.ndarray) -> np.ndarray:
-        """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) is turned by `turns` (k,)."""
-        table = np.empty((len(turns), len(pairs)))
+    def changed(self, pairs: np.ndarray, changes: Sequence["Change"]) -> np.ndarray:
+        """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) has each of `changes` (k)."""
+        table = np.empty((len(changes), len(pairs)))
         for column, (one, other) in enumerate(pairs):
             tree, later = cKDTree(self._placed(self._heard[one], AS_TOLD)), self._heard[other]
             centre = later.track.at(later.times[-1])[:2]
-            late = self._placed(later, AS_TOLD) - centre
-            places = [rotated(late, np.full(len(late), turn)) + centre for turn in turns]
-            table[:, column] = [np.minimum(tree.query(place)[0], _FAR).mean() for place in places]
+            for row, (turn, ranges) in enumerate(changes):
+                late = self._placed(later._replace(points=ranges * later.points), AS_TOLD) - centre
+                place = rotated(late, np.full(len(late), turn)) + centre
+                table[row, column] = np.minimum(tree.query(place)[0], _FAR).mean()
         return table
+
+    def typical_range(self) -> float:
+        """Return the median range of echoes, m."""
+        return float(np.median(np.concatenate([np.hypot(*one.points.T) for one in self._heard])))
+
+
+class Change(NamedTuple):
+    """turn: rad, of a head that slipped. ranges: true over reported ones."""
+
+    turn: float
+    ranges: float
 
 
 class NearPairs(NamedTuple):

@@ -6,9 +6,10 @@ from typing import Deque, List, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause, of_steps, ranked, widened
+from mlsm_manager.self_check.causes import Cause, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.standing import standing_causes
 from node_support.geometry import composed, inverse
@@ -51,7 +52,9 @@ class LiveCauses:
                 return
             self._new, scans, places = 0, list(self._scans), self._places
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
-        found = [*echo_findings(scans, self.sonar_in_base, corrections).causes, *standing_causes(scans, _track(scans))]
+        track = _track(scans)
+        found = [*echo_findings(scans, self.sonar_in_base, corrections).causes, *standing_causes(scans, track)]
+        found += [of_stuck(*one) for one in stuck_headings(track)]
         with self._lock:
             if self._places is places:
                 self._found = found

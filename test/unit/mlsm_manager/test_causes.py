@@ -6,13 +6,15 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring
 
-from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
+from mlsm_manager.localisation.continuous_input import continuous_scan
+from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, impossible_steps
 from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
+from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.standing import standing_causes
@@ -84,6 +86,42 @@ def test_many_steps_are_one_cause():
     assert causes[0].text.endswith("9 times, first")
 
 
+@pytest.mark.parametrize("begin", [0.0, MIDDLE])
+def test_headings_that_tremble_are_smoothed(begin):
+    noise = 5.0 * np.random.RandomState(1).normal(size=len(WHOLE.track.times)) * broken.after(WHOLE, begin)
+    mended, causes = with_odometry_mended(broken.with_compass_error(WHOLE, np.radians(noise), False), LIMITS)
+    assert [cause.text for cause in causes] == ["the compass trembles by about 5 deg"]
+    assert causes[0].begin == pytest.approx(START + begin, abs=10.0)
+    assert causes[0].is_mended
+    assert np.degrees(np.std(mended.track.poses[:, 2] - WHOLE.track.poses[:, 2])) < 2.0
+
+
+def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on():
+    noise = np.radians(5.0) * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
+    scan, odometry = scans_in(broken.with_compass_error(WHOLE, noise, False))[2], ContinuousOdometry(LIMITS)
+    track = continuous_scan(odometry, scan).track
+    assert [step.text for step in odometry.trembling] == ["the compass trembles by about 5 deg"]
+    assert np.degrees(np.std(track.poses[:, 2] - WHOLE.track.at(track.times)[:, 2])) < 2.0
+
+
+def test_what_goes_along_with_the_vehicle_is_left_out():
+    heard = rare.hull_heard(WHOLE, 5.0)
+    beams, causes = without_companions(heard.beams, WHOLE.track)
+    assert [cause.text for cause in causes] == [
+        "something 4.9 m away goes along with the vehicle, in 120 deg of the circle"
+    ]
+    assert not any(one.beam.intensities[round(5.0 / one.beam.range_resolution) + 1] for one in beams[:3])
+    assert without_companions(WHOLE.beams, WHOLE.track) == (WHOLE.beams, [])
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_heading_that_stands_is_stuck_where_headings_are_measured(measured):
+    noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
+    recording = broken.with_compass_error(WHOLE, noise) if measured else WHOLE
+    _, causes = with_odometry_mended(rare.compass_sticks(recording, MIDDLE), LIMITS)
+    assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * measured
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_an_odometry_without_steps_stays_as_it_is(noise):
     poses = WHOLE.track.poses + noise * np.random.RandomState(0).normal(size=WHOLE.track.poses.shape)
@@ -105,6 +143,7 @@ def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
         (broken.mount_turned(WHOLE, -45.0), "the sonar is turned by -4"),
         (broken.mount_upside_down(WHOLE), "the sonar is upside down"),
         (broken.head_slips(WHOLE, MIDDLE, 40.0), "the head slipped by "),
+        (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0."),
         (broken.delayed(WHOLE, 8.0), "beams were sent"),
         (rare.bottom_lost(WHOLE, MIDDLE, 40.0), "the vehicle was carried by 1"),
     ],

@@ -1,0 +1,63 @@
+"""Echoes that go along with the vehicle, of its own frame, its tether or a boat that follows: found, and left out."""
+
+from dataclasses import replace
+from typing import List, Optional, Sequence, Tuple
+
+import numpy as np
+
+from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import CERTAIN, Cause
+from sonar_processing.beams.beam import PlacedBeam
+
+_SECTORS, _CELL = 36, 0.2  # of the circle; m, of the range
+_MOSTLY = 0.8  # share of a sector's beams that hear it at one range, while the vehicle moves and all else does
+_NARROWEST = 2  # sectors
+_WIDEST = 2.0 / 3.0  # of those looked at: a ring all around is the floor or the pulse, which echo_extractor removes
+_FEWEST = 10  # beams of a sector
+_MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
+_LEFT = 0.5  # m: by which what is hidden behind it may matter
+
+
+def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[PlacedBeam], List[Cause]]:
+    """Return the beams without what goes along with the vehicle, which goes by T_odom_base `track`, and the cause."""
+    moves = np.ptp(track.poses, axis=0)
+    if not beams or (np.array([np.hypot(*moves[:2]), moves[2]]) < _MOVES).all():
+        return list(beams), []
+    angles = np.array([one.beam.angle for one in beams])
+    sectors = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
+    goes_along = _heard_always(beams, sectors)
+    if goes_along is None:
+        return list(beams), []
+    near = goes_along | np.roll(goes_along, 1, axis=0) | np.roll(goes_along, -1, axis=0)
+    near[:, 1:] |= near[:, :-1].copy()
+    near[:, :-1] |= near[:, 1:].copy()
+    metres, width = _CELL * (0.5 + np.nonzero(goes_along)[1].min()), goes_along.any(axis=1).sum() * 360 // _SECTORS
+    text = f"something {metres:.1f} m away goes along with the vehicle, in {width} deg of the circle"
+    left = [_without(one, near[sector]) for one, sector in zip(beams, sectors)]
+    return left, [Cause(text, CERTAIN, is_mended=True, metres=_LEFT)]
+
+
+def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[np.ndarray]:
+    """Return in which cells (sectors, cells) most beams are loud; None where that is no companion."""
+    count = 1 + max(int(_cells(one).max()) for one in beams)
+    loud, looked = np.zeros((_SECTORS, count)), np.bincount(sectors, minlength=_SECTORS)
+    for one, sector in zip(beams, sectors):
+        strengths = one.beam.intensities
+        loud[sector, np.unique(_cells(one)[strengths > strengths.max(initial=0) / 2])] += 1.0
+    always = (loud > _MOSTLY * looked[:, np.newaxis]) & (looked >= _FEWEST)[:, np.newaxis]
+    widest = _WIDEST * np.count_nonzero(looked >= _FEWEST)
+    always[:, always.sum(axis=0) > widest] = False
+    return always if _NARROWEST <= always.any(axis=1).sum() <= widest else None
+
+
+def _cells(placed: PlacedBeam) -> np.ndarray:
+    bins = np.arange(max(len(placed.beam.intensities), 1))
+    return ((bins + 0.5) * placed.beam.range_resolution / _CELL).astype(int)
+
+
+def _without(placed: PlacedBeam, goes_along: np.ndarray) -> PlacedBeam:
+    """Return a beam that is silent in the cells (n,) of a sector."""
+    if not goes_along.any() or not len(placed.beam.intensities):
+        return placed
+    strengths = np.where(goes_along[_cells(placed)], 0, placed.beam.intensities).astype(placed.beam.intensities.dtype)
+    return replace(placed, beam=replace(placed.beam, intensities=strengths))
