@@ -1,4 +1,4 @@
-"""The exception with which a core refuses data that it cannot use."""
+"""The exception with which a core refuses data that it cannot use, and numbers in such texts."""
 
 
 class RefusedInput(ValueError):  # noqa: N818 - named for what it says, it is not an error of the program
@@ -7,3 +7,8 @@ class RefusedInput(ValueError):  # noqa: N818 - named for what it says, it is no
     def __init__(self, kind: str, detail: str) -> None:
         super().__init__(detail)
         self.kind = kind
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number of things whose plural ends with s."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"

@@ -10,6 +10,7 @@ from typing import Any, Dict, List, Optional, Sequence
 import numpy as np
 from scipy.ndimage import median_filter
 
+from node_support.errors import counted
 from node_support.geometry import FULL_TURN, wrapped
 from recordings.bags.bag import Bag, Topic
 from recordings.bags.topic_roles import Role, with_role
@@ -186,10 +187,11 @@ def beam_lines(recorded: RecordedBeams) -> List[str]:
     """Return sentences on all beams of a recording, at least one."""
     beams = sorted(recorded.beams, key=lambda beam: beam.stamp_ns)
     start, end = beams[0].stamp_ns, beams[-1].stamp_ns
-    lost = f"; {recorded.refused} messages were damaged or held none" if recorded.refused else ""
+    refused = counted(recorded.refused, "message")
+    lost = f"; {refused} damaged or without a beam" if recorded.refused else ""
     shifts = sweep_shifts(beams)
     return [
-        f"{len(beams)} beams in {(end - start) * 1e-9:.1f} s{lost}",
+        f"{counted(len(beams), 'beam')} in {(end - start) * 1e-9:.1f} s{lost}",
         *_head(beams),
         *_settings(beams, recorded),
         _gaps(np.array([beam.stamp_ns for beam in beams])),
@@ -205,9 +207,9 @@ def _head(beams: List[Beam]) -> List[str]:
         return ["the head stood still"]
     swept = np.array([one.sum() for one in moved])
     is_turn = swept >= _WHOLE * FULL_TURN
-    told = [f"{is_turn.sum()} whole turns"] if is_turn.any() else []
+    told = [counted(is_turn.sum(), "whole turn")] if is_turn.any() else []
     if not is_turn.all():
-        told.append(f"{(~is_turn).sum()} sweeps of {np.degrees(np.median(swept[~is_turn])):.0f} degrees")
+        told.append(f"{counted((~is_turn).sum(), 'sweep')} of {np.degrees(np.median(swept[~is_turn])):.0f} degrees")
     return [f"the head made {' and '.join(told)}"]
 
 
@@ -240,4 +242,4 @@ def _gaps(stamps_ns: np.ndarray) -> str:
     if not gaps.size:
         return f"no gap longer than {_GAP:g} s"
     at = (stamps_ns[int(np.argmax(seconds))] - stamps_ns[0]) * 1e-9
-    return f"{len(gaps)} gaps longer than {_GAP:g} s, the longest {gaps.max():.1f} s after {at:.1f} s"
+    return f"{counted(len(gaps), 'gap')} longer than {_GAP:g} s, the longest {gaps.max():.1f} s after {at:.1f} s"

@@ -8,7 +8,8 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
 from mlsm_manager.self_check.headline import FEWEST_MATCHED
-from mlsm_manager.self_check.verdict import Answer, counted
+from mlsm_manager.self_check.verdict import Answer
+from node_support.errors import counted
 
 _PAGE = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">

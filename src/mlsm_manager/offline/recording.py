@@ -8,7 +8,7 @@ from typing import Callable, Dict, Iterable, Iterator, List, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.errors import RefusedInput
+from node_support.errors import RefusedInput, counted
 from node_support.geometry import composed, inverse, matrices, transformed
 from node_support.headers import DAY
 from recordings.bags.bag import RecordingError
@@ -149,7 +149,8 @@ def whole_turns(
 
 
 def _no_turn(path: Path, beams: int) -> RecordingError:
-    return RecordingError(f"{path}: no turn, sweep or part of one of which echoes can be told, in {beams} beam(s)")
+    heard = counted(beams, "beam")
+    return RecordingError(f"{path}: no turn, sweep or part of one of which echoes can be told, in {heard}")
 
 
 def track_between(track: Track, start: float, end: float) -> Track:

@@ -15,7 +15,7 @@ from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, positions_at, 
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.headline import WITHIN
-from mlsm_manager.self_check.verdict import counted
+from node_support.errors import counted
 from node_support.geometry import composed, inverse, transformed
 
 _FIRST_YEAR = 1990  # of recordings

@@ -35,10 +35,13 @@ _DRIFTING = {
     **_STILL, "speed_deviation": 0.05, "rate_correlation_time": 60.0, "heading_deviation": 0.0,
     "turn_rate_deviation": 0.003,
 }  # fmt: skip
+# A log does not tell where the head is mounted: as far as is known the vehicle slips as fast as it goes ahead.
+_ANYWHERE = {"slip_deviation": 0.2, "slip_correlation_time": 40.0}
 _WITHOUT_MOTION: Dict[Optional[SweepMotion], Dict[str, float]] = {
     SweepMotion.STILL: _SEEMS_STILL,
     SweepMotion.UNTOLD: _STILL,
     SweepMotion.DRIFTING: _DRIFTING,
+    SweepMotion.MOVING: _ANYWHERE,
 }
 
 

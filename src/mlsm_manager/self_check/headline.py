@@ -5,7 +5,8 @@ from typing import Sequence
 import numpy as np
 
 from mlsm_manager.self_check.causes import Cause
-from mlsm_manager.self_check.verdict import Answer, Verdict, counted
+from mlsm_manager.self_check.verdict import Answer, Verdict
+from node_support.errors import counted
 
 WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
 FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds

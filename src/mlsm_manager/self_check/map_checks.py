@@ -51,8 +51,8 @@ def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> V
     figures = f"{percent(lowest)} of the echoes on earlier surfaces, at least {percent(limit)} needed"
     text = f"scans fit those before them ({figures})"
     if len(starts):
-        text = "scans do not fit those before them; a vehicle that moves sideways needs --odometry hovering "
-        text += f"(only {figures})"
+        text = "scans do not fit those before them; a vehicle with a compass that moves sideways needs "
+        text += f"--odometry hovering (only {figures})"
     doubtful = merged(starts, float(np.median(np.diff(times))) * (_WINDOW - 1))
     return Verdict(name, lowest, limit, text, True, doubtful, question)
 

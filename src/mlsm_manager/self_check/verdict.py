@@ -76,11 +76,6 @@ def moment(time: float, begin: float) -> str:
     return f"{into} ({datetime.fromtimestamp(time, timezone.utc):%H:%M:%S} UTC)"
 
 
-def counted(number: int, noun: str) -> str:
-    """Return a number of things whose plural ends with s."""
-    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
-
-
 def percent(share: float, digits: int = 0) -> str:
     """Return a share as people read it."""
     return f"{100.0 * share:.{digits}f} %"

@@ -209,8 +209,8 @@ def test_four_scans_of_twenty_beside_the_others_are_no_reason_to_doubt():
 def test_a_third_of_the_scans_beside_the_others_is():
     verdict = run_of(np.arange(10, 19))
     assert verdict.line() == (
-        "DOUBTFUL: scans do not fit those before them; a vehicle that moves sideways needs --odometry hovering "
-        "(only 20 % of the echoes on earlier surfaces, at least 65 % needed)"
+        "DOUBTFUL: scans do not fit those before them; a vehicle with a compass that moves sideways needs "
+        "--odometry hovering (only 20 % of the echoes on earlier surfaces, at least 65 % needed)"
     )
     assert verdict.doubtful[0, 0] <= 10 * TURN_SECONDS
     assert verdict.doubtful[-1, 1] >= 18 * TURN_SECONDS

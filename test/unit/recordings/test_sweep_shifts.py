@@ -80,10 +80,10 @@ def test_head_settings_gaps_and_motion_are_told():
     gains = [0] * 200 + [2] * 210
     told = beam_lines(RecordedBeams(made + late, [], refused=3, gains=gains))
     assert told[:2] == [
-        "410 beams in 100.9 s; 3 messages were damaged or held none",
+        "410 beams in 100.9 s; 3 messages damaged or without a beam",
         "the head made 8 sweeps of 86 degrees",
     ]
     assert told[2] == "range: 15 m in 300 bins from 0.0 s, 30 m in 300 bins from 100.0 s"
     assert told[3:5] == ["step: 1.8 degrees from 0.0 s", "gain: 0 from 0.0 s, 2 from 20.0 s"]
-    assert told[5] == "1 gaps longer than 1 s, the longest 60.1 s after 39.9 s"
+    assert told[5] == "1 gap longer than 1 s, the longest 60.1 s after 39.9 s"
     assert told[6].startswith("motion as sweeps show it: still; ")
