@@ -7,7 +7,7 @@ from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
 import yaml
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from node_support.files import write_whole
+from node_support.files import check_output, write_whole
 from node_support.help import CommandLine, ending_in_one_line
 from node_support.names_2015 import KEYS, Key
 from node_support.parameters import EXPERT, ParameterError, ParameterSet, read_values
@@ -40,6 +40,7 @@ def run_migrate_yaml() -> None:
     parser.add_argument(
         "--out", type=Path, required=True, metavar="DIR", help=f"folder to write {FILE} to; created if missing"
     )
+    parser.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     with ending_in_one_line("migrate_yaml", ParameterError):
         print("\n".join(migrated(parser.parse_args())))
 
@@ -51,6 +52,7 @@ def migrated(options: argparse.Namespace) -> List[str]:
         for owner, values in _by_owner(file).items():
             given.setdefault(owner, {}).update(values)
     target = options.out / FILE
+    check_output(target, options.files, options.overwrite)
     write_whole(target, migrated_text(given).encode())
     known = [key for owner in given for key in given[owner]]
     kept = sum(not _BY_OWNER[owner][key].here for owner in given for key in given[owner])

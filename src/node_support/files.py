@@ -1,12 +1,13 @@
-"""Where files of this package lie, and files that are written whole or not at all."""
+"""Where files of this package lie, and files and folders that are written whole or not at all."""
 
 import errno
 import fcntl
 import os
+import shutil
 import tempfile
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Iterable, Iterator, Tuple
+from typing import Iterable, Iterator, Sequence, Tuple
 
 PACKAGE = "underwater_map_construction"
 _MARK = f"<name>{PACKAGE}</name>"
@@ -59,6 +60,31 @@ def whole_file(path: Path) -> Iterator[Path]:
         raise
     finally:
         os.close(handle)
+
+
+@contextmanager
+def whole_folder(folder: Path, inputs: Sequence[Path]) -> Iterator[Path]:
+    """Give the path of a temporary folder whose files take their places in `folder` when the block ends well.
+
+    On any failure the files that are there stay as they were, and none comes. Raises OSError, which names the file by
+    its place; also where it would replace one of `inputs`.
+    """
+    parts = folder / f".run{_PART}"
+    shutil.rmtree(str(parts), ignore_errors=True)
+    make_folder(parts)
+    try:
+        yield parts
+        written = {path: folder / path.relative_to(parts) for path in sorted(parts.rglob("*")) if path.is_file()}
+        for target in written.values():
+            check_output(target, inputs, overwrite=True)
+        for path, target in written.items():
+            make_folder(target.parent)
+            os.replace(str(path), str(target))
+    except OSError as error:
+        place = str(error.filename).replace(str(parts), str(folder))
+        raise OSError(error.errno, error.strerror, place) from error
+    finally:
+        shutil.rmtree(str(parts), ignore_errors=True)
 
 
 def make_folder(path: Path) -> None:

@@ -6,7 +6,7 @@ import unittest
 
 import rospy
 import tf2_ros
-from graph import Diagnostics, Inbox, run, wait_for_links
+from graph import Diagnostics, Inbox, nodes_of, run, wait_for_links
 from messages import beam, publisher, transform, turn
 from sensor_msgs.msg import PointCloud2
 
@@ -48,6 +48,18 @@ class BadBeams(unittest.TestCase):
         self.scans.wait_for(
             lambda cloud: start < cloud.header.stamp <= rospy.Time.from_sec(self.time) and cloud.width > 100
         )
+
+    def test_0_beams_from_before_tf_are_counted_without_a_warning(self) -> None:
+        broadcaster, early = tf2_ros.TransformBroadcaster(), 3
+        wait_for_links("/tf", len(nodes_of("/tf")[1]))
+        for _ in range(early):
+            self.send(frame="late")
+        for seconds in (0.05, 1.0):
+            broadcaster.sendTransform(transform("odom", "late", self.time + seconds))
+        self.send(frame="late")
+        self.diagnostics.wait_for("sonar_to_cloud", "beams before tf", early)
+        self.assertNotIn("beams without transform", self.diagnostics.values("sonar_to_cloud"))
+        type(self).time += 1.0
 
     def test_1_a_good_scan_passes(self) -> None:
         self.expect_a_scan()

@@ -25,3 +25,9 @@ def test_a_unit_gives_its_launch_file_arguments_that_it_knows(unit):
     for name in re.findall(r"(\w+)\.launch", command):
         known = get_args([str(ROOT / f"launch/{name}.launch")])
         assert set(re.findall(r"(\w+):=", command)) <= set(known)
+
+
+def test_the_vehicle_starts_anew_with_its_master_which_has_lost_all_parameters():
+    told = (ROOT / "systemd/umc-vehicle.service").read_text()
+    assert re.search(r"^PartOf=umc-roscore\.service$", told, re.MULTILINE)
+    assert re.search(r"^After=.*\bumc-roscore\.service\b", told, re.MULTILINE)

@@ -21,7 +21,7 @@ from mlsm_manager.offline.run_reports import mission_of, summary_lines, summary_
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.report.mission import Mission
 from node_support.errors import RefusedInput
-from node_support.files import make_folder, write_whole
+from node_support.files import make_folder, whole_folder, write_whole
 from node_support.help import CommandLine, ending_in_one_line
 from node_support.parameters import OLD_KEYS, ParameterError, assigned_values, read_values
 from recordings.bags.bag import RecordingError
@@ -56,7 +56,7 @@ def _map_each(options: Namespace, arguments: List[str]) -> None:
 
 
 def map_bag(options: Namespace) -> Dict[str, Any]:
-    """Map the bag and write the files; return what summary.json holds. Raises RecordingError and OSError."""
+    """Map the bag and write all files or none; return what summary.json holds. Raises RecordingError and OSError."""
     start = time.monotonic()
     for bag in options.bags:
         bag.stat()
@@ -67,25 +67,26 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
         print(f"map_bag: {options.bags[0]}: {note}", file=sys.stderr)
     make_folder(options.out)
     mapped = with_origin(mapped_bag(recording, options), options)
-    _write_results(mapped, options)
     errors = errors_of(mapped.run, mapped.recording)
-    summary = summary_of(mapped, errors, time.monotonic() - start)
-    write_summary(options.out, summary)
-    mission = mission_of(mapped, errors)
-    if options.mcap:
-        write_mcap(options.out / MCAP, mission, options.out / PICTURE)
-    _write_report(options.out, mission)
+    with whole_folder(options.out, options.read) as folder:
+        _write_results(folder, mapped, options)
+        summary = summary_of(mapped, errors, time.monotonic() - start)
+        write_summary(folder, summary)
+        mission = mission_of(mapped, errors)
+        if options.mcap:
+            write_mcap(folder / MCAP, mission, folder / PICTURE)
+        _write_report(folder, mission)
     return summary
 
 
-def _write_results(mapped: MappedBag, options: Namespace) -> None:
-    """Write map, trajectories and live.yaml, each whole or not at all."""
-    write_run(options.out, mapped.title, mapped.run, mapped.recording)
+def _write_results(folder: Path, mapped: MappedBag, options: Namespace) -> None:
+    """Write map, trajectories and live.yaml."""
+    write_run(folder, mapped.title, mapped.run, mapped.recording)
     for number, session in enumerate(mapped.sessions, start=2):
-        write_trajectory(options.out / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
-    write_charts(options.out, mapped)
+        write_trajectory(folder / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
+    write_charts(folder, mapped)
     live = live_text(mapped.parameters, options.odom_frame, options.base_frame, options.chain)
-    write_whole(options.out / "live.yaml", live.encode())
+    write_whole(folder / "live.yaml", live.encode())
 
 
 def _write_report(folder: Path, mission: Mission) -> None:
@@ -112,6 +113,7 @@ def map_bag_arguments(arguments: List[str]) -> argparse.Namespace:
     parser = _parser()
     options = parser.parse_args(arguments)
     _check(parser, options)
+    options.read = [*options.bags, *filter(None, (options.vehicle, options.parameters))]
     values = _values(options)
     options.fixed = frozenset(values)
     if options.odometry is not None:

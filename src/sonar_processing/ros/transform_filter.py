@@ -5,7 +5,7 @@ Where nobody tells tf where the sonar is mounted, that is published too.
 
 import threading
 import time
-from typing import Callable, Dict, Optional
+from typing import Callable, Dict, List, Optional, Tuple
 
 import message_filters
 import rospy
@@ -79,7 +79,8 @@ class TransformFilter(message_filters.SimpleFilter):
     """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
     A beam is dropped and counted when it has waited too long (BeamQueue), when it is older than one that was delivered,
-    or when tf can place a later beam of its frame but not this one. A stamp more than `JUMP_BACK` seconds older than
+    or when tf can place a later beam of its frame but not this one. Beams from before tf told anything, which all hear
+    that start beside a running head, are counted without a warning. A stamp more than `JUMP_BACK` seconds older than
     its predecessor means that time jumped: the waiting beams are forgotten.
     """
 
@@ -101,6 +102,7 @@ class TransformFilter(message_filters.SimpleFilter):
         self._queue = BeamQueue()
         self._newest_ns: Optional[int] = None
         self._jumped = False
+        self._has_placed = False
         self._has_news = False
         self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, self._notify, target_frame)
         self._take = guarded(health, self._deliver_ready)
@@ -163,12 +165,22 @@ class TransformFilter(message_filters.SimpleFilter):
             jumped, self._jumped = self._jumped, False
             if self._mount is not None and self._mount.is_wanted:
                 self._mount.look_at(self._queue.frames(), self._transforms)
-            placed = [self._placed(*departure) for departure in self._queue.pop(self._obstacle)]
+            placed = [self._placed(*departure) for departure in self._departures()]
         if jumped:
             self._on_time_jump()
         for beam in placed:
             if beam is not None:
                 self.signalMessage(beam)
+
+    def _departures(self) -> List[Tuple[WaitingBeam, str]]:
+        """Return the beams that leave the queue, each with why it cannot be placed, from the first placed one on."""
+        departures = self._queue.pop(self._obstacle)
+        placeable = [departure for departure in departures if not departure[1]]
+        if self._has_placed or not placeable:
+            return departures
+        self._has_placed = True
+        self._health.count("beams before tf", len(departures) - len(placeable))
+        return placeable
 
     def _placed(self, waiting: WaitingBeam, obstacle: str) -> Optional[PlacedBeam]:
         """Return the beam with its place, None (counted) where tf does not know it."""

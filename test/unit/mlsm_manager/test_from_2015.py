@@ -108,7 +108,8 @@ def test_modes_were_found_by_their_parts(owner, before, after):
 def written(folder, files):
     for name, values in files.items():
         (folder / f"{name}.yaml").write_text(yaml.safe_dump(values))
-    return argparse.Namespace(files=[folder / f"{name}.yaml" for name in files], out=folder / "out")
+    files = [folder / f"{name}.yaml" for name in files]
+    return argparse.Namespace(files=files, out=folder / "out", overwrite=False)
 
 
 def test_the_files_of_2015_become_one_that_the_nodes_take(tmp_path):
@@ -120,6 +121,15 @@ def test_the_files_of_2015_become_one_that_the_nodes_take(tmp_path):
     assert found["/mlsm_core/expert/max_iterations"] == 10
     assert (found["/outlier_remover/mean_k"], found["/line_detector/max_iterations"]) == (100, 1000000)
     assert found["/mlsm_core/expert/error_threshold"] == 100.0
+
+
+def test_a_file_that_exists_is_replaced_only_if_asked(tmp_path):
+    options = written(tmp_path, FILES)
+    migrated(options)
+    with pytest.raises(FileExistsError, match="--overwrite replaces it"):
+        migrated(options)
+    options.overwrite = True
+    migrated(options)
 
 
 def test_a_dump_names_its_nodes_and_a_file_of_another_name_tells_by_its_keys(tmp_path):

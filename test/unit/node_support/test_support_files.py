@@ -1,5 +1,6 @@
 """Temporary files of processes that were killed while they wrote, and where relative paths lead."""
 
+import errno
 import os
 import signal
 import subprocess
@@ -8,7 +9,7 @@ from contextlib import nullcontext
 
 import pytest
 
-from node_support.files import check_output, remove_abandoned_parts, ros_path, whole_file, write_whole
+from node_support.files import check_output, remove_abandoned_parts, ros_path, whole_file, whole_folder, write_whole
 
 WRITER = """
 import sys, time
@@ -109,3 +110,45 @@ def test_relative_paths_lie_in_ros_home(monkeypatch, ros_home, path, whole):
     if ros_home:
         monkeypatch.setenv("ROS_HOME", ros_home)
     assert str(ros_path(path)) == whole
+
+
+def _files_in(folder):
+    return {str(path.relative_to(folder)): path.read_text() for path in folder.rglob("*") if path.is_file()}
+
+
+def test_a_run_that_cannot_write_its_last_file_leaves_none_and_the_older_ones_as_they_were(tmp_path):
+    (tmp_path / "map.mlsm").write_text("old")
+
+    def run():
+        with whole_folder(tmp_path, []) as folder:
+            write_whole(folder / "map.mlsm", b"new")
+            write_whole(folder / "tiles/18/0.png", b"new")
+            with whole_file(folder / "report.html"):
+                raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+
+    with pytest.raises(OSError, match=f"File too large: '{tmp_path}/report.html'"):
+        run()
+    assert _files_in(tmp_path) == {"map.mlsm": "old"}
+
+
+def test_a_run_that_ends_well_leaves_all_its_files_and_those_that_it_did_not_make(tmp_path):
+    (tmp_path / "map.mlsm").write_text("old")
+    (tmp_path / "notes.txt").write_text("mine")
+    with whole_folder(tmp_path, []) as folder:
+        write_whole(folder / "map.mlsm", b"new")
+        write_whole(folder / "tiles/18/0.png", b"new")
+    assert _files_in(tmp_path) == {"map.mlsm": "new", "notes.txt": "mine", "tiles/18/0.png": "new"}
+
+
+def test_a_run_does_not_write_over_what_it_reads(tmp_path):
+    motion = tmp_path / "trajectory.csv"
+    motion.write_text("read")
+
+    def run():
+        with whole_folder(tmp_path, [motion]) as folder:
+            write_whole(folder / "map.mlsm", b"new")
+            write_whole(folder / "trajectory.csv", b"new")
+
+    with pytest.raises(OSError, match=r"is read too.*trajectory\.csv"):
+        run()
+    assert _files_in(tmp_path) == {"trajectory.csv": "read"}
