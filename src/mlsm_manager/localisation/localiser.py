@@ -104,7 +104,10 @@ class Localiser:
         return self.estimator.matching
 
     def match(self, matching: bool) -> bool:
-        """Turn matching on or off; return whether that is a change."""
+        """Turn matching on or off; return whether that is a change.
+
+        Without it scans are not compared, also for causes of errors: a sonar that tilts hears other things each turn.
+        """
         with self._lock:
             changed = self.estimator.matching != matching
             self.estimator.matching = matching
@@ -151,7 +154,8 @@ class Localiser:
             if update.belief is not None:
                 self._live.believe(update.belief)
                 self._age.learn_odometry(scan.reference_time, scan.reference_pose)
-                self._causes.take(scan, update.belief.theta[POSE])
+                if self.estimator.matching:
+                    self._causes.take(scan, update.belief.theta[POSE])
             if update.accepted and update.result is not None:
                 self._age.learn_fix(scan.reference_time)
                 added = self._causes.covariance(self._wrong)

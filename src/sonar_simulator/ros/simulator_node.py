@@ -110,6 +110,8 @@ class Simulator:
         moments = simulation.moments(rate)
         while self._play(moments, pace):
             self._publisher.publish_progress(self._now / simulation.duration)
+        if self._ended.is_set():
+            return
         self._publisher.publish_progress(1.0)
         name = self.health.name
         rospy.loginfo("%s: the moves have ended after %.0f s; the map stays, Ctrl-C ends it", name, self._now)

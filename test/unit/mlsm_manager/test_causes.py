@@ -7,6 +7,7 @@ from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.localisation.continuous_input import continuous_scan
+from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, impossible_steps
 from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended
 from mlsm_manager.offline.map_bag import map_bag_arguments
@@ -214,6 +215,15 @@ def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(
     assert (np.trace(live.covariance([])) > 0.25) == bool(said)
     live.clear()
     assert live.causes([]) == []
+
+
+def test_scans_that_are_not_matched_are_not_compared():
+    localiser = LocaliserParameters().build_localiser()
+    localiser.match(False)
+    for scan in scans_in(broken.mount_turned(WHOLE, 120.0)):
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+    assert localiser.causes() == []
 
 
 def test_causes_are_ranked_by_evidence_and_what_was_mended_comes_last():
