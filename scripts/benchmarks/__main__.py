@@ -32,6 +32,7 @@ STUDIES = (
     "link",
     "logs",
     "long_run",
+    "lost",
     "no_parameters",
     "page_link",
     "silence",

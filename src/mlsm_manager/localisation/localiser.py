@@ -12,15 +12,15 @@ from georeferencing.origin import STORED, Origin
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.continuous_input import continuous_cloud, continuous_scan
 from mlsm_manager.localisation.estimator import Estimator
-from mlsm_manager.localisation.joint_session import belief_at
+from mlsm_manager.localisation.joint_session import belief_at, belief_of_match
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.place_now import FixAge, PlaceNow
-from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
+from mlsm_manager.localisation.resumption import FoundPlace, PlaceSearch, StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
 from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import Matcher, Scan, Track
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.live_causes import LiveCauses
@@ -38,6 +38,7 @@ _LEAP = 600.0
 # s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
 # that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
+_UNCONFIRMED = "found in the whole map by this scan alone; the next one must be found where that leads to"
 
 
 class MapInput(Enum):
@@ -310,7 +311,7 @@ class Localiser:
             scan = self._newest
             if scan is None:
                 return None
-            update = self._found(scan)
+            update = self._adopted(scan, self._found(scan))
             if update.accepted:
                 self._search.forget()
                 self._live.believe(update.belief)
@@ -318,17 +319,23 @@ class Localiser:
 
     def _searched(self, scan: Scan) -> ScanUpdate:
         """Search the whole map for a scan, and then where the vehicle was expected: few echoes may look like chance."""
-        update = self._found(scan)
+        result, errors = self._found(scan), self.estimator.errors
+        if result.accepted:
+            found = FoundPlace(belief_of_match(scan, result, errors), scan.reference_pose)
+            if not self._search.confirms(found, errors):
+                result = replace(result, status=MatchStatus.AMBIGUOUS, reason=_UNCONFIRMED)
+        update = self._adopted(scan, result)
         return update if update.accepted or not self._search.may_be_near else self.estimator.add_scan(scan)
 
-    def _found(self, scan: Scan) -> ScanUpdate:
-        """Search the whole map for a scan; where it is found it goes into the map."""
-        result = relocalised(scan, self.estimator.target, self._settings.anywhere, self.estimator.errors)
-        return (
-            self.estimator.adopt(scan, result)
-            if result.accepted
-            else ScanUpdate(scan, result, False, self.estimator.belief)
-        )
+    def _found(self, scan: Scan) -> MatchResult:
+        """Search the whole map for a scan."""
+        return relocalised(scan, self.estimator.target, self._settings.anywhere, self.estimator.errors)
+
+    def _adopted(self, scan: Scan, result: MatchResult) -> ScanUpdate:
+        """Take the place where a scan was found as the vehicle's."""
+        if result.accepted:
+            return self.estimator.adopt(scan, result)
+        return ScanUpdate(scan, result, False, self.estimator.belief)
 
     @property
     def is_lost(self) -> bool:

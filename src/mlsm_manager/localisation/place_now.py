@@ -5,8 +5,7 @@ from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, carried_on
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.headline import FEWEST_MATCHED
@@ -78,8 +77,7 @@ class FixAge:
         if self._fixed_at is None or self._believed is None:
             return None
         if time > belief.time and self._believed[0] == belief.time:
-            track = Track(np.array([belief.time, time]), np.array([self._believed[1], pose]))
-            belief = predicted(belief, track, time, errors)
+            belief = carried_on(belief, self._believed[1], pose, time, errors)
         covariance = belief.covariance[POSE, POSE].copy()
         covariance[POSITION, POSITION] += added
         return PlaceNow(time, time - self._fixed_at, self._fixes.overdue(time), covariance, self._count)

@@ -12,17 +12,19 @@ import numpy as np
 from mlsm_manager.joint_solver.run_log import stacked, unstacked
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.scan_matching.prediction import Belief
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, carried_on
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.scan_matching.scan_path import POSE, STATES
+from mlsm_manager.scan_matching.scan_path import POSE, POSITION, STATES, YAW
 from mlsm_manager.surface_map.blocks import ROW_WIDTH
 from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, inverse
+from node_support.geometry import composed, inverse, wrapped
 
 # m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
 _STRAYED = np.array([1.0, 1.0, 0.1])
 _LONGEST_BRIDGE = 30.0  # s: in one or two turns of a head a vehicle hardly leaves a straight line
+_SURE = 3.0  # standard deviations by which two places of one vehicle may differ
+_FARTHEST = 10.0  # m: where the odometry since a scan is less sure, the next one confirms nothing
 _MOST_REJECTED = 3  # scans in a row that do not match show that the vehicle is elsewhere
 # Of a scan's points that must lie on surfaces of the map. In a marina 0.78 to 1 do where the vehicle is, and 0.71 at
 # most where it was put 10 m or more aside.
@@ -81,6 +83,23 @@ class StoredPlace:
         return Belief(self.belief.time, self.belief.theta, covariance)
 
 
+@dataclass(frozen=True)
+class FoundPlace:
+    """Where a scan was found somewhere in the map, when the odometry said T_odom_base (3,)."""
+
+    belief: Belief
+    T_odom_base: np.ndarray
+
+    def leads_to(self, later: "FoundPlace", errors: OdometryErrors) -> bool:
+        """Return whether the odometry, which errs by `errors`, goes from here to a place that was found later."""
+        expected = carried_on(self.belief, self.T_odom_base, later.T_odom_base, later.belief.time, errors)
+        difference = (later.belief.theta - expected.theta)[POSE]
+        difference[YAW] = wrapped(difference[YAW])
+        covariance = (expected.covariance + later.belief.covariance)[POSE, POSE]
+        is_near = difference @ np.linalg.solve(covariance, difference) < _SURE**2
+        return bool(is_near and np.trace(expected.covariance[POSITION, POSITION]) < _FARTHEST**2)
+
+
 class PlaceSearch:
     """Decides, scan by scan after a map was loaded, whether the place is known, expected or lost."""
 
@@ -91,6 +110,7 @@ class PlaceSearch:
         """Take the place as known."""
         self._left: Optional[int] = None
         self._is_expected = False
+        self._found: Optional[FoundPlace] = None
 
     def expect(self) -> None:
         """Take the place as near to where it is expected."""
@@ -99,8 +119,8 @@ class PlaceSearch:
 
     def lose(self) -> None:
         """Take the place as anywhere in the map."""
+        self.forget()
         self._left = 0
-        self._is_expected = False
 
     def jump(self) -> None:
         """Learn that time jumped: what was expected does not hold any more."""
@@ -123,6 +143,15 @@ class PlaceSearch:
             self.forget()
         elif self._left:
             self._left -= 1
+
+    def confirms(self, found: FoundPlace, errors: OdometryErrors) -> bool:
+        """Return whether a place where a scan was found is that to which the one found before leads.
+
+        A basin looks alike from both ends: some scans of the end that the map does not have are found at the other, but
+        seldom two in a row (`scripts/bench lost`).
+        """
+        before, self._found = self._found, found
+        return before is not None and before.leads_to(found, errors)
 
 
 @dataclass(frozen=True)

@@ -122,6 +122,11 @@ def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors)
     return Belief(time, lasting * theta, transition @ belief.covariance @ transition.T + fresh)
 
 
+def carried_on(belief: Belief, then: np.ndarray, now: np.ndarray, time: float, errors: OdometryErrors) -> Belief:
+    """Return the belief at a later `time`, when the odometry said T_odom_base `then` (3,) at its own and `now` (3,)."""
+    return predicted(belief, Track(np.array([belief.time, time]), np.array([then, now])), time, errors)
+
+
 def updated_by_heading(belief: Belief, heading: float, deviation: float) -> Belief:
     """Return the belief after a compass said `heading` [rad] with standard `deviation`; 0 stands for no compass."""
     if deviation == 0.0:

@@ -5,9 +5,12 @@ import pytest
 from made_scans import SECONDS, at_velocity, drifting, elsewhere, harbour, scan_of, still
 
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.localisation.resumption import PlaceSearch, StoredPlace
+from mlsm_manager.localisation.resumption import FoundPlace, PlaceSearch, StoredPlace
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchStatus, Track
+from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_of_bytes
+from node_support.geometry import composed
 
 pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; joint sessions are resumed with every version")]
 
@@ -27,6 +30,11 @@ def restored(stored, same_odometry, **changes):
     localiser = PARAMETERS.changed(changes).build_localiser()
     localiser.restore(stored, same_odometry)
     return localiser
+
+
+def displaced(turn):
+    """Return a scan of a vehicle at rest by an odometry whose frame lies elsewhere."""
+    return scan_of(harbour(), still(), at_velocity((0.0, 0.0, 0.0), (30.0, -20.0, 0.0)), SECONDS * turn)
 
 
 def test_all_layers_and_the_place_are_stored(stored):
@@ -71,10 +79,36 @@ def test_a_track_stays_as_it_is_where_the_stored_place_says_nothing_of_it(stored
 def test_another_odometry_is_found_anywhere_in_the_map(stored):
     localiser = restored(stored, same_odometry=False)
     assert localiser.is_lost
-    update = localiser.take_scan(scan_of(harbour(), still(), at_velocity((0.0, 0.0, 0.0), (30.0, -20.0, 0.0)))).scan
-    assert update.accepted, update.result.reason
-    np.testing.assert_allclose(update.result.pose[:2], [0.0, 0.0], atol=0.1)
+    one_scan, two_scans = (localiser.take_scan(displaced(turn)).scan for turn in range(2))
+    assert (one_scan.accepted, one_scan.result.status) == (False, MatchStatus.AMBIGUOUS)
+    assert two_scans.accepted, two_scans.result.reason
+    np.testing.assert_allclose(two_scans.result.pose[:2], [0.0, 0.0], atol=0.1)
     assert not localiser.is_lost
+
+
+def found_place(time, pose, T_odom_base):
+    errors = OdometryErrors().covariance()
+    errors[POSE, POSE] = np.diag(np.array([0.3, 0.3, 0.02]) ** 2)
+    return FoundPlace(Belief(time, np.append(pose, np.zeros(5)), errors), T_odom_base)
+
+
+@pytest.mark.parametrize(
+    ("aside", "confirms"), [((0.5, 0.3, 0.02), True), ((5.0, 0.0, 0.0), False), ((0.0, 0.0, 0.5), False)]
+)
+def test_a_place_is_confirmed_where_the_odometry_leads_to_the_next_one(aside, confirms):
+    """Scans of water that the map does not have are each found on another part of it."""
+    odometry, place, step = np.array([30.0, -20.0, 2.0]), np.array([4.0, 5.0, 0.5]), np.array([4.0, 1.0, 0.3])
+    search = PlaceSearch()
+    search.lose()
+    assert not search.confirms(found_place(100.0, place, odometry), OdometryErrors())
+    later = found_place(116.0, composed(place, step) + np.array(aside), composed(odometry, step))
+    assert search.confirms(later, OdometryErrors()) == confirms
+
+
+def test_after_a_time_in_which_the_odometry_strays_far_the_next_scan_confirms_nothing(stored):
+    localiser = restored(stored, same_odometry=False)
+    updates = [localiser.take_scan(displaced(turn)).scan for turn in (0, 500)]
+    assert [update.accepted for update in updates] == [False, False]
 
 
 def test_a_lost_vehicle_does_not_write_into_the_map(stored):

@@ -1,0 +1,154 @@
+"""Prints whether a vehicle that knows nothing of its place finds itself in a stored map, and whether it is right.
+
+Each map is drawn with an exact odometry, whole or of the first part of a tour. A vehicle is then put into it at many
+moments of another tour of the same water, with an odometry of usual errors in a frame of its own. It takes scans until
+its position is called good, at most ten. A position is wrong if it is off by more than 3 m and by more than four times
+what is stated. After half of a tour some vehicles are where the map has nothing: these should not be called good.
+"""
+
+from dataclasses import replace
+from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+
+import numpy as np
+
+from benchmarks.canals import recording as canal
+from benchmarks.harness import benchmark_parser
+from benchmarks.paths import replay_input
+from benchmarks.tours import simulated
+from benchmarks.twin_conditions import TwinParameters, reported
+from mlsm_manager.localisation.localiser import Localiser
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
+from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
+from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.replay import ReplayParameters
+from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.surface_map.map_file import StoredMap
+from node_support.geometry import composed, transformed
+
+_MOST_SCANS = 10
+_WRONG, _SURE = 3.0, 4.0  # m, stated deviations
+_FAR = 100.0  # m, by which the odometry's frame is elsewhere
+
+
+class Case(NamedTuple):
+    """A map, and another run in the same water. truth: T_map_base of that run."""
+
+    mapped: Recording
+    other: Recording
+    truth: Track
+
+
+class Start(NamedTuple):
+    """scans: until the position was called good; None where it never was. error, stated: then [m]."""
+
+    scans: Optional[int]
+    error: float
+    stated: float
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether a position that is called good is not where the vehicle is."""
+        return self.scans is not None and self.error > max(_WRONG, _SURE * self.stated)
+
+
+def tour_case(name: str) -> Case:
+    """Return two runs of a simulated tour."""
+    first, second = simulated(name, seed=1), simulated(name, seed=2)
+    return Case(first.recording(first.truth), second.with_dvl(2), second.truth)
+
+
+def canal_case(posts: int) -> Case:
+    """Return two runs of two basins with a canal between them; what differs is what the odometry reports."""
+    made, truth = canal(posts, 0, False)
+    odometry = reported(truth, TwinParameters(scale=0.01), np.random.RandomState(3))
+    shifted = Track(odometry.times, odometry.poses + np.append(truth.poses[0, :2], 0.0))
+    return Case(made.with_track(truth), made.with_track(shifted), truth)
+
+
+CASES = {
+    "basin": (tour_case, "basin_tour", 1.0),
+    "basin, a third of the tour": (tour_case, "basin_tour", 0.34),
+    "basin, half of the tour": (tour_case, "basin_tour", 0.5),
+    "basin, two thirds of the tour": (tour_case, "basin_tour", 0.67),
+    "harbour": (tour_case, "harbour_tour", 1.0),
+    "harbour, half of the tour": (tour_case, "harbour_tour", 0.5),
+    "harbour ahead": (tour_case, "harbour_ahead_tour", 1.0),
+    "canal": (canal_case, 0, 1.0),
+    "canal with 12 posts": (canal_case, 12, 1.0),
+}
+"""What makes each case, of what, and how much of its tour the map has."""
+
+
+def stored_map(recording: Recording, share: float) -> Tuple[StoredMap, ReplayParameters]:
+    """Return the map of the first `share` of a recording, and what it was made with."""
+    scans, parameters = replay_input(recording, OdometryKind.DVL)
+    localiser = parameters.build_localiser(recording.sonar_in_base)
+    for scan in scans[: int(share * len(scans))]:
+        localiser.take_scan(scan)
+    return localiser.stored("map", {}, 0.0, ""), parameters
+
+
+def started(localiser: Localiser, scans: Iterable[Scan], truth: Track) -> Start:
+    """Feed a localiser that is lost until it calls its position good."""
+    for count, scan in enumerate(scans, 1):
+        update = localiser.take_scan(scan).scan
+        place = localiser.place_now(scan.reference_time, scan.reference_pose)
+        doubts = doubts_of(place, localiser.causes(), localiser.verdicts(), {})
+        state, _ = position_state(place, localiser.is_lost, update.provisional, doubts)
+        if state is PositionState.GOOD:
+            error = update.belief.theta[:2] - truth.at(np.array([scan.reference_time]))[0, :2]
+            return Start(count, float(np.hypot(*error)), place.deviation)
+    return Start(None, np.nan, np.nan)
+
+
+def starts(case: Case, share: float, count: int) -> List[Start]:
+    """Return what came of `count` starts all along the other run."""
+    stored, parameters = stored_map(case.mapped, share)
+    scans, _ = replay_input(case.other, OdometryKind.DVL)
+    rng = np.random.RandomState(5)
+    found = []
+    for first in (np.linspace(0.0, 0.9, count) * len(scans)).astype(int):
+        frame = np.append(rng.uniform(-_FAR, _FAR, 2), rng.uniform(-np.pi, np.pi))
+        localiser = parameters.build_localiser(case.other.sonar_in_base)
+        localiser.restore(stored, False)
+        moved = (in_frame(frame, scan) for scan in scans[first : first + _MOST_SCANS])
+        found.append(started(localiser, moved, case.truth))
+    return found
+
+
+def in_frame(frame: np.ndarray, scan: Scan) -> Scan:
+    """Return a scan as an odometry places it whose frame lies at `frame` (3,) in the one before."""
+    track = Track(scan.track.times, composed(frame, scan.track.poses))
+    return replace(scan, points=transformed(frame, scan.points), track=track)
+
+
+def line(found: Sequence[Start]) -> str:
+    """Return the figures of some starts for people."""
+    good = [one for one in found if one.scans is not None]
+    if not good:
+        return f"called good 0 of {len(found)}"
+    scans, errors, stated = np.array(good, dtype=float).T
+    wrong = sum(one.is_wrong for one in good)
+    return (
+        f"called good {len(good)} of {len(found)}, wrong {wrong}; after {np.median(scans):.0f} scans in the middle, "
+        f"{scans.max():.0f} at most; error {np.median(errors):.2f} m in the middle, {errors.max():.2f} at most; "
+        f"stated {np.median(stated):.2f} m"
+    )
+
+
+def main() -> None:
+    """Print one line per case."""
+    parser = benchmark_parser("lost", __doc__)
+    parser.add_argument("--starts", type=int, default=20, help="in each map (default: %(default)s)")
+    parser.add_argument("--cases", nargs="*", default=list(CASES), choices=list(CASES), metavar="CASE")
+    arguments = parser.parse_args()
+    made: Dict[Tuple[object, ...], Case] = {}
+    for name in arguments.cases:
+        make, of, share = CASES[name]
+        if (make, of) not in made:
+            made[make, of] = make(of)
+        print(f"{name}: {line(starts(made[make, of], share, arguments.starts))}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
