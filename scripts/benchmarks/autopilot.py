@@ -9,18 +9,21 @@ import subprocess
 import sys
 import time
 from contextlib import contextmanager
-from typing import Any, Callable, Iterator, List, Tuple
+from pathlib import Path
+from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Tuple
 
 import numpy as np
+from matplotlib.figure import Figure
 
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table
+from benchmarks.harness import ROOT, Row, benchmark_parser, print_table, say
 
 sys.path.append(str(ROOT / "test/rostest"))
 sys.path.append(str(ROOT / "test/stopping"))
 
-_DEMO = ("rviz:=false", "real_time_factor:=1.0", "odometry:=dvl")
+_DEMO = ("rviz:=false", "real_time_factor:=1.0", "odometry_error:=0.3")
 _PATIENCE = 180.0  # s until the graph runs
 _WANTED = "<= 150 ms at 95 %"
+_GAP = 1.0  # s from a position on either side: what lies between is drawn as not sent
 
 
 @contextmanager
@@ -41,8 +44,8 @@ def _graph(master: int, autopilot: int) -> Iterator[None]:
             one.wait()
 
 
-def measured(seconds: float) -> List[Row]:
-    """Return the rows of a run of so many seconds after the first position."""
+def measured(seconds: float, picture: Optional[Path]) -> List[Row]:
+    """Return the rows of a run of so many seconds after the first position; picture: where to draw it, a PNG."""
     from stopwatch import free_port
 
     master, autopilot = free_port(), free_port()
@@ -53,47 +56,115 @@ def measured(seconds: float) -> List[Row]:
         from geometry_msgs.msg import PoseWithCovarianceStamped
         from nav_msgs.msg import Odometry
 
+        from underwater_map_construction.msg import PositionStatus
+
         _wait(lambda: rosgraph.is_master_online() and rosgraph.Master("/bench").hasParam("/use_sim_time"))
         rospy.init_node("autopilot_bench", anonymous=True, disable_signals=True)
-        odometry, fixes = Arrivals("/odom", Odometry), Arrivals("/MLSM/pose", PoseWithCovarianceStamped)
+        odometry, truth = Arrivals("/odom", Odometry), Arrivals("/ground_truth", Odometry)
+        fixes = Arrivals("/MLSM/pose", PoseWithCovarianceStamped)
+        doubts: List[str] = []
+        rospy.Subscriber("/MLSM/status", PositionStatus, lambda one: doubts.extend([one.text] if one.state else []))
         peer = Peer(f"udpin:127.0.0.1:{autopilot}", clock=lambda: rospy.get_rostime().to_nsec())
+        say("the vehicle dives; nothing is sent before three fixes agree: about a minute")
         _wait(lambda: bool(peer.of_type("ODOMETRY")))
+        say(f"positions come: measuring for {seconds:g} s")
+        doubts.clear()
         time.sleep(seconds)
         peer.close()
-        return _rows(peer, odometry.table(), fixes.table())
+    run = Run(_sent(peer), *(one.table() for one in (odometry, truth, fixes)))
+    if picture is not None:
+        _draw(run).savefig(picture, dpi=90)
+    if doubts:
+        say(f"not sent in {len(doubts)} s; the last doubt: {doubts[-1]}")
+    return _rows(run)
 
 
 class Arrivals:
-    """When the messages of a topic came."""
+    """When the messages of a topic came, and where they say the vehicle is."""
 
     def __init__(self, topic: str, kind: type) -> None:
         import rospy
 
-        self._rows: List[Tuple[float, float]] = []
+        self._rows: List[Tuple[float, float, float, float]] = []
         rospy.Subscriber(topic, kind, self._take, queue_size=1000, tcp_nodelay=True)
 
     def _take(self, message: Any) -> None:
-        self._rows.append((message.header.stamp.to_sec(), time.monotonic()))
+        place = message.pose.pose.position
+        self._rows.append((message.header.stamp.to_sec(), time.monotonic(), place.x, place.y))
 
     def table(self) -> np.ndarray:
-        """Return (n, 2) s: stamps, and arrivals by this machine's clock."""
+        """Return (n, 4): stamps [s], arrivals by this machine's clock [s], x and y [m]."""
         return np.array(self._rows)
 
 
-def _rows(peer: Any, odometry: np.ndarray, fixes: np.ndarray) -> List[Row]:
+class Run(NamedTuple):
+    """Tables as those of Arrivals. sent: what the autopilot got, x east and y north; two more columns are the stated
+    deviation [m] and the reset counter.
+    """
+
+    sent: np.ndarray
+    odometry: np.ndarray
+    truth: np.ndarray
+    fixes: np.ndarray
+
+
+def _sent(peer: Any) -> np.ndarray:
     pairs = [(at, one) for at, one in zip(peer.arrivals, peer.received) if one.get_type() == "ODOMETRY"]
-    arrived = np.array([at for at, _ in pairs])
-    stamps = np.array([one.time_usec for _, one in pairs]) * 1e-6 - peer.ahead_ns * 1e-9
+    rows = [
+        (one.time_usec * 1e-6 - peer.ahead_ns * 1e-9, at, one.y, one.x,
+         np.sqrt(one.pose_covariance[0] + one.pose_covariance[6]), one.reset_counter)
+        for at, one in pairs
+    ]  # fmt: skip
+    return np.array(rows)
+
+
+def _rows(run: Run) -> List[Row]:
+    arrived, fixes = run.sent[:, 1], run.fixes[run.fixes[:, 1] > run.sent[0, 1]]
     following = np.searchsorted(arrived, fixes[:, 1])
     known = following < len(arrived)
-    ages = arrived - _moments(stamps, odometry)
-    fix_ages = arrived[following[known]] - _moments(fixes[known, 0], odometry)
-    rate = (len(arrived) - 1) / (arrived[-1] - arrived[0])
+    ages = arrived - _moments(run.sent[:, 0], run.odometry)
+    fix_ages = arrived[following[known]] - _moments(fixes[known, 0], run.odometry)
+    errors = _errors(run)
     return [
         (f"age of {len(ages)} positions on arrival, median and 95 %", _told(ages), _WANTED),
         (f"age of {len(fix_ages)} fixes on arrival, median and 95 %", _told(fix_ages), "as the solver needs"),
-        ("positions a second", f"{rate:.1f}", "10"),
+        ("positions a second", f"{(len(arrived) - 1) / np.ptp(arrived):.1f}", "10"),
+        ("longest time without a position", f"{np.diff([*arrived, run.odometry[-1, 1]]).max():.1f} s", ""),
+        ("off the truth, mean and most", f"{errors.mean():.2f} and {errors.max():.2f} m", ""),
+        ("within two stated deviations", f"{100.0 * (errors < 2.0 * run.sent[:, 4]).mean():.0f} %", ""),
     ]
+
+
+def _errors(run: Run) -> np.ndarray:
+    """Return how far (n,) [m] what was sent is from the truth."""
+    times, _, *truth = run.truth.T
+    return np.hypot(*(run.sent[:, 2 + axis] - np.interp(run.sent[:, 0], times, truth[axis]) for axis in (0, 1)))
+
+
+def _draw(run: Run) -> Figure:
+    """Return the ways from above, and over time how far what was sent is from the truth."""
+    figure = Figure(figsize=(11.0, 4.2), tight_layout=True)
+    above, course = figure.subplots(1, 2, gridspec_kw={"width_ratios": (3, 2)})
+    for table, color, style, name in (
+        (run.odometry, "0.6", "-", "odometry, 30 % off"),
+        (run.truth, "black", ":", "where the vehicle was"),
+        (run.sent, "tab:green", "-", "sent to the autopilot"),
+    ):
+        above.plot(table[:, 2], table[:, 3], style, color=color, label=name)
+    above.plot(run.fixes[:, 2], run.fixes[:, 3], "o", mfc="white", mec="tab:pink", ms=5, label="fixes")
+    above.set(xlabel="east [m]", ylabel="north [m]", aspect="equal", adjustable="datalim")
+    times, moments = (table[:, 0] - run.odometry[0, 0] for table in (run.sent, run.odometry))
+    is_sent = np.diff(np.searchsorted(times, [moments - _GAP, moments + _GAP]), axis=0)[0] > 0
+    course.plot(times, 2.0 * run.sent[:, 4], color="tab:pink", label="two stated deviations")
+    course.plot(times, _errors(run), color="tab:green", label="off the truth")
+    jumps = times[1:][np.diff(run.sent[:, 5]) != 0.0]
+    course.vlines(jumps, 0.0, run.sent[:, 4].max(), color="0.3", ls="--", label="reset_counter goes up")
+    top = 1.05 * 2.0 * run.sent[:, 4].max()
+    course.fill_between(moments, 0.0, top, where=~is_sent, color="0.93", label="not good: nothing is sent")
+    course.set(xlabel="time [s]", ylabel="[m]", xlim=(0.0, moments[-1]), ylim=(0.0, top))
+    above.legend(fontsize=8)
+    course.legend(fontsize=8)
+    return figure
 
 
 def _moments(stamps: np.ndarray, odometry: np.ndarray) -> np.ndarray:
@@ -103,7 +174,7 @@ def _moments(stamps: np.ndarray, odometry: np.ndarray) -> np.ndarray:
 
 
 def _told(seconds: np.ndarray) -> str:
-    return " and ".join(f"{1e3 * value:.0f} ms" for value in np.percentile(seconds, [50.0, 95.0]))
+    return " and ".join(f"{round(1e3 * value)} ms" for value in np.percentile(seconds, [50.0, 95.0]))
 
 
 def _wait(holds: Callable[[], bool]) -> None:
@@ -117,8 +188,10 @@ def _wait(holds: Callable[[], bool]) -> None:
 def main() -> None:
     """Print the table."""
     parser = benchmark_parser("autopilot", __doc__)
-    parser.add_argument("--seconds", type=float, default=120.0, help="how long to measure after the first position")
-    print_table(measured(parser.parse_args().seconds))
+    parser.add_argument("--seconds", type=float, default=60.0, help="how long to measure after the first position")
+    parser.add_argument("--picture", type=Path, help="a PNG of what was sent, beside the truth")
+    options = parser.parse_args()
+    print_table(measured(options.seconds, options.picture))
 
 
 if __name__ == "__main__":
