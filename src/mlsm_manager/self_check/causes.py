@@ -43,7 +43,7 @@ class Cause:
 
     def line(self, run_begin: float) -> str:
         """Return it for people; run_begin: s."""
-        return self.text if np.isnan(self.begin) else f"{self.text} at {moment(self.begin, run_begin)}"
+        return self.text if np.isnan(self.begin) else f"{self.text} at {moment(max(self.begin, run_begin), run_begin)}"
 
 
 def ranked(causes: Iterable[Cause]) -> List[Cause]:
