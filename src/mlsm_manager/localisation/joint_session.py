@@ -20,8 +20,7 @@ from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
-from mlsm_manager.self_check.odometry_checks import odometry_decided
-from mlsm_manager.self_check.path_checks import position_uncertainty
+from mlsm_manager.self_check.path_checks import odometry_decided, position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, inverse, transformed, wrapped
 

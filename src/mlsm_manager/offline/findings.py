@@ -19,11 +19,11 @@ from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Cause, widened
 from mlsm_manager.self_check.headline import headline, is_told
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
-from mlsm_manager.self_check.odometry_checks import odometry_decided
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
     halves_agree,
+    odometry_decided,
     per_minute,
     position_uncertainty,
 )

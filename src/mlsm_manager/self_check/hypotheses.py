@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import composed, inverse, rotated, transformed
 
-_MOST, _FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
+MOST, FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
 _PAIRS, _FEWEST_PAIRS = 60, 10  # pairs of scans, spread over the run: more tell nothing new, fewer nothing
 _APART = (1, 2, 3)  # scans between the two of a pair: far enough apart that the vehicle moved
 _MOVED = 2.0  # m, or rad times 10 m: by less the scans lie on each other whatever is wrong
@@ -62,7 +62,7 @@ class ScanPairs:
     ) -> None:  # fmt: skip
         """sonar_in_base: (2,) m, by tf. corrections: T_map_odom as the solver found it; None where none did yet."""
         self._sonar, self._corrections = sonar_in_base, corrections
-        self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= _FEWEST]
+        self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
         self._pairs = self._chosen()
         self._known: Dict[Hypothesis, np.ndarray] = {}
 
@@ -94,8 +94,7 @@ class ScanPairs:
             needed = {number for pair in self._pairs for number in pair}
             placed = {number: self._placed(self._heard[number], hypothesis) for number in needed}
             trees = {number: cKDTree(placed[number]) for number in {first for first, _ in self._pairs}}
-            apart = [np.minimum(trees[one].query(placed[other])[0], _FAR).mean() for one, other in self._pairs]
-            self._known[hypothesis] = np.array(apart)
+            self._known[hypothesis] = np.array([_apart(trees[one], placed[other]) for one, other in self._pairs])
         return self._known[hypothesis]
 
     def _placed(self, heard: _Heard, hypothesis: Hypothesis) -> np.ndarray:
@@ -124,14 +123,10 @@ class ScanPairs:
 
     def near(self) -> "NearPairs":
         """Return all pairs of scans up to three apart, as they lie if nothing is wrong."""
-        numbers = range(len(self._heard))
-        pairs = [(one, one + apart) for apart in _APART for one in numbers[:-apart]]
-        placed = [self._placed(one, self.honest) for one in self._heard]
-        trees = [cKDTree(places) for places in placed]
-        apart = [np.minimum(trees[one].query(placed[other])[0], _FAR).mean() for one, other in pairs]
+        pairs, apart = near_pairs([self._placed(one, self.honest) for one in self._heard])
         begins = np.array([one.times[0] for one in self._heard])
         middles = np.array([one.times.mean() for one in self._heard])
-        return NearPairs(np.array(pairs).reshape(-1, 2), begins, middles, np.array(apart))
+        return NearPairs(pairs, begins, middles, apart)
 
     def carried(self, pairs: np.ndarray, velocities: np.ndarray) -> np.ndarray:
         """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the vehicle went by `velocities` (k, 2) [m/s]
@@ -141,7 +136,7 @@ class ScanPairs:
         for column, (one, other) in enumerate(pairs):
             tree, later = cKDTree(self._placed(self._heard[one], honest)), self._placed(self._heard[other], honest)
             moves = velocities * (self._heard[other].times.mean() - self._heard[one].times.mean())
-            table[:, column] = [np.minimum(tree.query(later + move)[0], _FAR).mean() for move in moves]
+            table[:, column] = [_apart(tree, later + move) for move in moves]
         return table
 
     def in_odometry(self, velocity: np.ndarray, time: float) -> np.ndarray:
@@ -158,8 +153,7 @@ class ScanPairs:
             centre = later.track.at(later.times[-1])[:2]
             for row, (turn, ranges) in enumerate(changes):
                 late = self._placed(later._replace(points=ranges * later.points), AS_TOLD) - centre
-                place = rotated(late, np.full(len(late), turn)) + centre
-                table[row, column] = np.minimum(tree.query(place)[0], _FAR).mean()
+                table[row, column] = _apart(tree, rotated(late, np.full(len(late), turn)) + centre)
         return table
 
     def typical_range(self) -> float:
@@ -187,6 +181,18 @@ class NearPairs(NamedTuple):
         return (self.pairs[:, 0] >= first) & (self.pairs[:, 1] <= last)
 
 
+def near_pairs(placed: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the numbers (p, 2) of scans up to three apart, and how far (p,) [m] they lie apart; placed: (n, 2) m."""
+    trees = [cKDTree(places) for places in placed]
+    pairs = [(one, one + apart) for apart in _APART for one in range(len(placed) - apart)]
+    distances = [_apart(trees[one], placed[other]) for one, other in pairs]
+    return np.array(pairs, dtype=int).reshape(-1, 2), np.array(distances)
+
+
+def _apart(tree: cKDTree, places: np.ndarray) -> float:
+    return float(np.minimum(tree.query(places)[0], _FAR).mean())
+
+
 def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Optional[np.ndarray] = None) -> float:
     """Return by how much (nats) distances `closer` (p,) [m] are likelier than `apart` (p,) that another cause leaves.
 
@@ -200,7 +206,7 @@ def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Option
 
 
 def _heard(scan: Scan, sonar_in_base: np.ndarray) -> _Heard:
-    chosen = slice(None, None, -(-len(scan) // _MOST))
+    chosen = slice(None, None, -(-len(scan) // MOST))
     order = np.argsort(scan.times[chosen], kind="stable")
     times, points = scan.times[chosen][order], scan.points[chosen, :2][order]
     return _Heard(transformed(inverse(scan.track.at(times)), points) - sonar_in_base, times, scan.track)

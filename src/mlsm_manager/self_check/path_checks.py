@@ -1,9 +1,10 @@
-"""Checks of the path and of the calibration: against the odometry, other solutions, and what was expected."""
+"""Checks of path, odometry and calibration: against each other, other solutions, and what was expected."""
 
-from typing import Sequence, Tuple
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.hypotheses import Doubt
 from mlsm_manager.self_check.verdict import Verdict, merged, percent
 
 _WINDOW, _STEP = 350.0, 14.0  # s: about 25 scans, and between windows about one turn of a head
@@ -12,6 +13,7 @@ _SPREAD_LIMIT, _APART_LIMIT = 2.0, 3.0  # standard deviations of the path, and o
 _SHORTEST = 15.0  # m that the vehicle must have gone in a window, so that a ratio means something
 _HEADING_SPREAD = 0.05  # rad by which the direction of motion may differ along a run: compass and mounting
 _NOWHERE = np.empty((0, 2))
+_LEAST_DOUBT = 1.0  # m: less does not matter to a map
 LARGEST_DEVIATION = 5.0  # m, above which a position is not known, see position_uncertainty
 
 
@@ -180,3 +182,18 @@ def _most_apart(first: np.ndarray, second: np.ndarray, deviations: np.ndarray) -
     distances = np.abs(np.subtract(first, second)) / deviations
     worst = int(np.argmax(distances))
     return worst, float(distances[worst])
+
+
+def odometry_decided(doubt: Optional[Doubt]) -> Tuple[Verdict, ...]:
+    """Return whether the odometry that is not believed makes the position more uncertain than all the rest does.
+
+    None where there is only one.
+    """
+    if doubt is None:
+        return ()
+    limit = max(doubt.own, _LEAST_DOUBT)
+    text = "it is clear" if doubt.deviation <= limit else "it is not clear"
+    text += f" which odometry the vehicle has ({doubt.told}; with {doubt.other} it is {doubt.apart:.1f} m elsewhere, "
+    text += f"which adds {doubt.deviation:.1f} m to the stated deviation, limit {limit:.1f} m)"
+    question = "Do the echoes tell whether the distances are a DVL's, where the profile auto leaves that open?"
+    return (Verdict("odometry decided", doubt.deviation, limit, text, question=question),)

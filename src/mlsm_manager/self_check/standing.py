@@ -3,15 +3,12 @@
 from typing import List, Sequence, Tuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlsm_manager.odometry.mending import standing_stretches
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs
 
-_MOST, _FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
-_FAR = 4.0  # m: echoes that are farther from all others say no more than that something else is heard
-_APART = (1, 2, 3)  # scans between two that are compared
 _FEWEST_PAIRS = 3
 _CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose itself says that nobody measured it
 _STRAIGHT = 2  # stretches of one heading, without positions: more are straight ways by a compass without noise
@@ -52,9 +49,7 @@ def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) 
 
 def _pairs(scans: Sequence[Scan]) -> Tuple[np.ndarray, np.ndarray]:
     """Return times (p, 2) [s], when the scans of each pair began and ended, and how far (p,) [m] they lie apart."""
-    heard = [scan for scan in scans if len(scan) >= _FEWEST]
-    places = [scan.points[:: -(-len(scan) // _MOST), :2] for scan in heard]
-    trees = [cKDTree(one) for one in places]
-    numbers = [(one, one + apart) for apart in _APART for one in range(len(heard) - apart)]
-    times = np.array([[heard[one].start, heard[other].reference_time] for one, other in numbers]).reshape(-1, 2)
-    return times, np.array([np.minimum(trees[a].query(places[b])[0], _FAR).mean() for a, b in numbers])
+    heard = [scan for scan in scans if len(scan) >= FEWEST]
+    numbers, apart = near_pairs([scan.points[:: -(-len(scan) // MOST), :2] for scan in heard])
+    times = [[heard[one].start, heard[other].reference_time] for one, other in numbers]
+    return np.array(times).reshape(-1, 2), apart

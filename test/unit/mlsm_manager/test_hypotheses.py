@@ -12,7 +12,7 @@ from mlsm_manager.joint_solver.hypotheses import Doubt, Hypotheses, likelier
 from mlsm_manager.joint_solver.motion_models import SCALE
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.self_check.odometry_checks import odometry_decided
+from mlsm_manager.self_check.path_checks import odometry_decided
 
 pytestmark = pytest.mark.long
 
