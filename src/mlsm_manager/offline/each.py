@@ -24,6 +24,7 @@ TIMEOUT = 10.0
 """s: a cluster in the same network answers within a second, a busy one within a few."""
 PATIENCE = 30.0
 """s without any worker after which none is expected to come back: a worker that is started anew needs a few."""
+_WORKER = "python3 -m distributed.cli.dask_worker ADDRESS"
 _LOGS = ("distributed.client", "distributed.utils", "asyncio")
 
 
@@ -83,13 +84,13 @@ class Cluster:
     def _check_workers(self, folder: Path) -> None:
         """Raise RecordingError without a worker, and for one that lacks packages or does not see a folder."""
         if not self._client.scheduler_info()["workers"]:
-            raise RecordingError(f"--scheduler {self._address}: it has no worker; start one with: dask-worker ADDRESS")
+            raise RecordingError(f"--scheduler {self._address}: it has no worker; start one with: {_WORKER}")
         try:
             found: Dict[str, Tuple[Dict[str, str], bool]] = self._client.run(_look, folder)
         except Exception as error:  # whatever the import of our packages leads to on a worker
             raise RecordingError(
                 f"--scheduler {self._address}: a worker cannot run map_bag: {error}; start workers with the "
-                "Python that runs it here: python3 -m distributed.cli.dask_worker ADDRESS"
+                f"Python that runs it here: {_WORKER}"
             ) from None
         for worker, (versions, is_there) in found.items():
             if versions != _versions():

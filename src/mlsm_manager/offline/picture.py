@@ -43,7 +43,9 @@ def draw_map(
     if len(blocks):
         _draw_blocks(axes, blocks)
     for path, style in zip(paths, cycle(_LINE_STYLES)):
-        axes.plot(*path.poses[:, :2].T, style, color=path.color, linewidth=1.6, label=path.name, zorder=5)
+        # A dot where it begins: of a vehicle that stood nothing else would be seen.
+        begin = {"marker": "o", "markersize": 4.0, "markevery": [0]}
+        axes.plot(*path.poses[:, :2].T, style, color=path.color, linewidth=1.6, label=path.name, zorder=5, **begin)
     if best is not None and uncertainty is not None:
         _draw_uncertainty(axes, best, uncertainty)
     axes.set_aspect("equal")
