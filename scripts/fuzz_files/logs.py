@@ -70,7 +70,8 @@ class LogMaker:
         summary = json.loads((out / "summary.json").read_text())
         checks = summary["checks"].items()
         untold = [name for name, check in checks if check["answer"] == "fine" and check["value"] is None]
-        if untold or (summary["matched"] < 3 and "NOT MEASURED" not in summary["trust"]):
+        is_measured = summary["matched"] >= 3 or any(check["answer"] == "DOUBTFUL" for _, check in checks)
+        if untold or not (is_measured or "nothing can be said of the position" in summary["trust"]):
             yield f"called fine without a measure: {untold}, {summary['trust']}"
         path = np.genfromtxt(str(out / "trajectory.csv"), delimiter=",", names=True)
         places = np.column_stack([path["corrected_x"], path["corrected_y"]])

@@ -29,7 +29,8 @@ def headline(
     mended = "".join(f"; mended: {cause.line(begin)}" for cause in causes if cause.is_mended)
     if wrong or doubtful:
         said = "; ".join([*wrong, *(one.text for one in doubtful)])
-        return f"trust: DOUBTFUL: {said}{mended}; at best {within}"
+        known = f"at best {within}" if is_told(verdicts, matched) else "nothing can be said of the position"
+        return f"trust: DOUBTFUL: {said}{mended}; {known}"
     reason = f"{counted(matched, 'scan')} matched, {FEWEST_MATCHED} needed" if matched < FEWEST_MATCHED else ""
     if not reason and not by_answer[Answer.FINE]:
         reason = assumed or f"none of {len(verdicts)} checks had enough data"
