@@ -2,6 +2,7 @@
 """play_bag.launch maps a recording of 2015 with its yaml files and thesis:=true, though the mapping stands still."""
 
 import os
+import re
 import signal
 import threading
 import unittest
@@ -15,7 +16,7 @@ import rosgraph
 from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import TEST_DATA, Diagnostics, Inbox, launched, run
 from old_bag import with_old_types
-from rosgraph_msgs.msg import Clock
+from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import PointCloud2
 
 from mlsm_manager.migrate_yaml import migrated_text
@@ -40,6 +41,7 @@ class PlayBag(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.maps, cls.clocks = Inbox("/MLSM/cloud", PointCloud2), Inbox("/clock", Clock)
+        cls.log = Inbox("/rosout", Log)
         cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
         cls.matched, cls.walls = Inbox("/debug_cloud", PointCloud2), Inbox("/sonar/walls/coeff", Wall)
         playback = ExitStack()
@@ -64,6 +66,10 @@ class PlayBag(unittest.TestCase):
 
     def test_every_beam_is_placed_though_the_mapping_stands_still_for_two_seconds(self) -> None:
         self.diagnostics.wait_for("sonar_to_cloud", "beams placed", self.beams)
+
+    def test_the_log_says_that_the_recording_has_ended(self) -> None:
+        ended = re.compile(r"old\.bag has ended after \d+ s; the map stays, Ctrl-C ends it")
+        self.log.wait_for(lambda line: ended.search(line.msg))
 
     def test_the_clock_never_stands_still(self) -> None:
         """It goes on in steps of 10 ms of wall time while messages are played."""
