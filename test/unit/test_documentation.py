@@ -99,7 +99,7 @@ def test_every_message_that_a_page_explains_stands_in_the_code(page):
 def test_every_table_of_figures_names_the_command_that_prints_it(page):
     head, *sections = re.split(r"^(?=#+ )", PAGES_BY_NAME[page].read_text(), flags=re.MULTILINE)[1:]
     told = [section for section in (head, *sections) if any(map(_holds_figures, TABLE.findall(section)))]
-    named = re.compile(r"scripts/(?:bench|results)\b")
+    named = re.compile(r"scripts/(?:bench|results|soak)\b")
     assert [one.partition("\n")[0] for one in told if not named.search(one) and not named.search(head)] == []
 
 
