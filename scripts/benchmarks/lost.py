@@ -11,11 +11,9 @@ from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from benchmarks.canals import recording as canal
 from benchmarks.harness import benchmark_parser
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
-from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
@@ -58,14 +56,6 @@ def tour_case(name: str) -> Case:
     return Case(first.recording(first.truth), second.with_dvl(2), second.truth)
 
 
-def canal_case(posts: int) -> Case:
-    """Return two runs of two basins with a canal between them; what differs is what the odometry reports."""
-    made, truth = canal(posts, 0, False)
-    odometry = reported(truth, TwinParameters(scale=0.01), np.random.RandomState(3))
-    shifted = Track(odometry.times, odometry.poses + np.append(truth.poses[0, :2], 0.0))
-    return Case(made.with_track(truth), made.with_track(shifted), truth)
-
-
 def elsewhere(mapped: str, other: str) -> Case:
     """Return a run in other water than that of the map, in which no place is right."""
     first, second = tour_case(mapped), tour_case(other)
@@ -82,8 +72,6 @@ CASES = {
     "harbour": (tour_case, ("harbour_tour",), 1.0),
     "harbour, half of the tour": (tour_case, ("harbour_tour",), 0.5),
     "harbour ahead": (tour_case, ("harbour_ahead_tour",), 1.0),
-    "canal": (canal_case, (0,), 1.0),
-    "canal with 12 posts": (canal_case, (12,), 1.0),
     "basin, vehicle in the harbour": (elsewhere, ("basin_tour", "harbour_tour"), 1.0),
     "harbour, vehicle in the basin": (elsewhere, ("harbour_tour", "basin_tour"), 1.0),
 }
