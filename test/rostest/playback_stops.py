@@ -2,7 +2,6 @@
 """play_bag.launch maps a recording of 2015 with its yaml files and thesis:=true, though the mapping stands still."""
 
 import os
-import re
 import signal
 import threading
 import unittest
@@ -41,7 +40,7 @@ class PlayBag(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.maps, cls.clocks = Inbox("/MLSM/cloud", PointCloud2), Inbox("/clock", Clock)
-        cls.log = Inbox("/rosout", Log)
+        cls.ends = Inbox("/rosout", Log, lambda line: " has ended after " in line.msg)
         cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
         cls.matched, cls.walls = Inbox("/debug_cloud", PointCloud2), Inbox("/sonar/walls/coeff", Wall)
         playback = ExitStack()
@@ -68,8 +67,7 @@ class PlayBag(unittest.TestCase):
         self.diagnostics.wait_for("sonar_to_cloud", "beams placed", self.beams)
 
     def test_the_log_says_that_the_recording_has_ended(self) -> None:
-        ended = re.compile(r"old\.bag has ended after \d+ s; the map stays, Ctrl-C ends it")
-        self.log.wait_for(lambda line: ended.search(line.msg))
+        self.assertRegex(self.ends.wait_for().msg, r"old\.bag has ended after \d+ s; the map stays, Ctrl-C ends it")
 
     def test_the_clock_never_stands_still(self) -> None:
         """It goes on in steps of 10 ms of wall time while messages are played."""
