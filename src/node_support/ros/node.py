@@ -165,7 +165,8 @@ class MasterWatch:
         """Begin to watch; the node has to be initialised."""
         self.is_lost = False
         self._master = xmlrpc.client.ServerProxy(rosgraph.get_master_uri(), _ImpatientTransport())
-        self._process: Optional[int] = None
+        # Asked at once: one that is restarted within the first period would be taken for the one that was there.
+        self._process = self._asked_process()
         threading.Thread(target=self._watch, daemon=True).start()
 
     def _watch(self) -> None:
@@ -175,12 +176,20 @@ class MasterWatch:
             unknown = unknown + 1 if self._does_not_know_us() else 0
         self.is_lost = True
 
-    def _does_not_know_us(self) -> bool:
+    def _asked_process(self) -> Optional[int]:
         try:
-            status, _, uri = self._master.lookupNode(rospy.get_name(), rospy.get_name())
-            process = self._master.getPid(rospy.get_name())[2]
+            return self._master.getPid(rospy.get_name())[2]
         except Exception:
             # A master that is killed while it answers leaves half an answer, and that almost any error.
+            return None
+
+    def _does_not_know_us(self) -> bool:
+        process = self._asked_process()
+        try:
+            status, _, uri = self._master.lookupNode(rospy.get_name(), rospy.get_name())
+        except Exception:
+            return False
+        if process is None:
             return False
         self._process = self._process or process
         return status != _SUCCESS or uri != rospy.get_node_uri() or process != self._process
