@@ -216,8 +216,9 @@ class JointSession:
 def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
     """Return scans without points from the newest of node_times (n,) [s] to the beginning of `scan`, n > 0.
 
-    None where that is less than a pause. The last one ends where the scan begins, which one without echoes does not
-    tell, so that the vehicle's motion within the scan does not hang on that in the pause.
+    None where that is less than a pause. The last one ends where the scan begins, so that the vehicle's motion
+    within the scan does not hang on that in the pause; there is none before a scan without echoes, whose beginning is
+    not known.
     """
     if len(node_times) < 2:
         return []
