@@ -92,7 +92,7 @@ def started(localiser: Localiser, scans: Iterable[Scan], truth: Track) -> Start:
     for count, scan in enumerate(scans, 1):
         update = localiser.take_scan(scan).scan
         place = localiser.place_now(scan.reference_time, scan.reference_pose)
-        doubts = doubts_of(place, localiser.causes(), localiser.verdicts(), {}, "odom")
+        doubts = doubts_of(place, localiser.following.causes(), localiser.verdicts(), {}, "odom")
         state, _ = position_state(place, localiser.is_lost, update.provisional, doubts)
         if state is PositionState.GOOD:
             error = update.belief.theta[:2] - truth.at(np.array([scan.reference_time]))[0, :2]

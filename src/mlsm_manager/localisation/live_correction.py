@@ -39,10 +39,10 @@ class LiveCorrection:
     def start_from(self, correction: np.ndarray) -> None:
         """Show `correction` T_map_odom (3,) until the first belief."""
         with self._lock:
-            self._start = np.array(correction, dtype=np.float64)
+            self.start = np.array(correction, dtype=np.float64)
 
     def _forget(self) -> None:
-        self._start = _IDENTITY
+        self.start = _IDENTITY
         self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
         self._state: Optional[np.ndarray] = None
         self._state_time = -math.inf
@@ -96,7 +96,7 @@ class LiveCorrection:
             self._follow(time, odometry)
             self._samples.append((time, odometry))
         if self._state is None:
-            return self._start
+            return self.start
         if self._jump_time is None:
             self._jump_time = time
         left = self._share_left(time - self._jump_time)

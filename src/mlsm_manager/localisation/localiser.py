@@ -4,26 +4,24 @@ import threading
 import time as wall
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Callable, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, List, Mapping, Optional, Tuple
 
 import numpy as np
 
 from georeferencing.origin import STORED, Origin
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.continuous_input import continuous_cloud, continuous_scan
 from mlsm_manager.localisation.estimator import Estimator
-from mlsm_manager.localisation.joint_session import belief_at, belief_of_match
-from mlsm_manager.localisation.live_correction import LiveCorrection
-from mlsm_manager.localisation.place_now import FixAge, PlaceNow
-from mlsm_manager.localisation.resumption import FoundPlace, PlaceSearch, StoredPlace
+from mlsm_manager.localisation.following import Following
+from mlsm_manager.localisation.joint_session import belief_at
+from mlsm_manager.localisation.lost_vehicle import PlaceSearch
+from mlsm_manager.localisation.place_now import PlaceNow
+from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
-from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
+from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
 from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Scan, Track
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
-from mlsm_manager.self_check.causes import Cause
-from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.blocks import Blocks
@@ -38,7 +36,6 @@ _LEAP = 600.0
 # s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
 # that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
-_UNCONFIRMED = "found in the whole map by this scan alone; the next one must be found where that leads to"
 
 
 class MapInput(Enum):
@@ -79,12 +76,8 @@ class Localiser:
         self.estimator = estimator
         self._lock = threading.RLock()
         self._changes = 0
-        self._live = LiveCorrection(settings.blend_time)
-        self._odometry = ContinuousOdometry(limits)
-        self._age = FixAge()
-        self._causes = LiveCauses()
-        self._clock = clock
-        self._came: Optional[Tuple[float, float]] = None
+        self.following = Following(limits, settings.blend_time, clock)
+        """What is known between scans."""
         self._newest: Optional[Scan] = None
         self._search = PlaceSearch()
         self._resumed_at: Optional[StoredPlace] = None
@@ -97,7 +90,7 @@ class Localiser:
         with self._lock:
             self._settings = settings
             self.estimator.matcher = settings.matcher
-            self._live.blend_time = settings.blend_time
+            self.following.use(settings.blend_time)
 
     @property
     def matching(self) -> bool:
@@ -123,7 +116,7 @@ class Localiser:
         """Learn where the sonar is in base_link, (2,) m."""
         with self._lock:
             self.estimator.mount(sonar_in_base)
-            self._causes.sonar_in_base = sonar_in_base
+            self.following.mount(sonar_in_base)
 
     @property
     def odometry(self) -> str:
@@ -147,20 +140,11 @@ class Localiser:
         with self._lock:
             self.notice_time(scan.reference_time)
             self._changes += 1
-            reported, scan = scan, continuous_scan(self._odometry, scan)
+            reported, scan = scan, self.following.taken(scan)
             self._newest = scan
-            self._came = scan.reference_time, self._clock()
             update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
             self._search.learn(update.accepted)
-            if update.belief is not None:
-                self._live.believe(update.belief)
-                self._age.learn_odometry(scan.reference_time, scan.reference_pose)
-                if self.estimator.matching:
-                    self._causes.take(scan, update.belief.theta[POSE])
-            if update.accepted and update.result is not None:
-                self._age.learn_fix(scan.reference_time)
-                added = self._causes.covariance(self._wrong)
-                update = replace(update, result=update.result.widened(added))
+            update = self.following.learned(scan, update, self.estimator.matching)
             clouds = []
             if self._settings.map_input is MapInput.MATCHED:
                 clouds.append(self.estimator.add_cloud(MapCloud.of_scan(scan)))
@@ -172,7 +156,7 @@ class Localiser:
         with self._lock:
             self.notice_time(cloud.end)
             self._changes += 1
-            return self.estimator.add_cloud(continuous_cloud(self._odometry, cloud))
+            return self.estimator.add_cloud(self.following.cloud(cloud))
 
     def take_points(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
@@ -180,28 +164,10 @@ class Localiser:
             self._changes += 1
             return self.estimator.add_points(points)
 
-    def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
-        """Return T_map_odom (3,) to be shown at `time` [s], when the odometry says T_odom_base (3,)."""
-        self._odometry.take(Track(np.array([time]), odometry[np.newaxis]))
-        fix = self._odometry.fixes(np.array(time))
-        return composed(self._live.sample(time, composed(fix, odometry)), fix)
-
-    def standing_correction(self, odometry: np.ndarray) -> np.ndarray:
-        """Return T_map_odom (3,) to be shown now by an odometry without stamps, as a static transform is.
-
-        Such an odometry says nothing of the time between scans: a new correction is blended in by the wall clock, and
-        then holds.
-        """
-        if self._came is None:
-            return self.last_correction
-        scan_time, came_at = self._came
-        since = min(max(self._clock() - came_at, 0.0), self._live.blend_time)
-        return self._live.standing_sample(scan_time + since, odometry)
-
     @property
     def last_correction(self) -> np.ndarray:
         """T_map_odom (3,) as the newest scan told it."""
-        return composed(self.estimator.correction, self._odometry.fixes(np.array(np.inf)))
+        return composed(self.estimator.correction, self.following.last_fix)
 
     def place_now(self, time: float, odometry: np.ndarray) -> Optional[PlaceNow]:
         """Return how old and how good the position is at `time` [s], when the odometry says T_odom_base (3,).
@@ -209,30 +175,8 @@ class Localiser:
         None before the first fix.
         """
         with self._lock:
-            pose, belief = composed(self._odometry.fixes(np.array(time)), odometry), self.estimator.belief
-            if belief is None:
-                return None
-            return self._age.place_at(time, pose, belief, self.estimator.errors, self._causes.covariance(self._wrong))
-
-    def look_for_causes(self) -> None:
-        """Look for what is wrong where new scans may show it, which takes most of a second.
-
-        Scans and corrections are taken meanwhile.
-        """
-        self._causes.look()
-
-    def causes(self) -> List[Cause]:
-        """Return what was found to be wrong, ranked."""
-        return self._causes.causes(self._wrong)
-
-    @property
-    def _wrong(self) -> Sequence[Step]:
-        return [*self._odometry.trembling, *self.steps]
-
-    @property
-    def steps(self) -> Sequence[Step]:
-        """What the odometry did that no vehicle does, oldest first; it was left out."""
-        return self._odometry.steps
+            belief = self.estimator.belief
+            return None if belief is None else self.following.place_at(time, odometry, belief, self.estimator.errors)
 
     def notice_time(self, time: float, odometry: Optional[np.ndarray] = None) -> float:
         """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did.
@@ -244,7 +188,7 @@ class Localiser:
         if until is None or until - _JUMP_BACK <= time <= until + _LEAP:
             return 0.0
         with self._lock:
-            goes_on = odometry is not None and self._odometry.goes_on_at(odometry)
+            goes_on = odometry is not None and self.following.goes_on_at(odometry)
             if time > until and not goes_on:
                 return 0.0
             place = StoredPlace(self.last_correction, self.estimator.belief)
@@ -253,10 +197,6 @@ class Localiser:
             if goes_on:
                 self._expect(place.correction, place.widened)
         return until - time
-
-    def notice_standing(self, stood: Sequence[Tuple[float, float]]) -> None:
-        """Learn from when to when [s] stamps of the odometry went on after its clock had stood; `stood` may grow."""
-        self._odometry.stood = stood
 
     def expect(self, pose: np.ndarray, covariance: np.ndarray, odometry: np.ndarray) -> None:
         """Take T_map_base `pose` (3,), with its covariance (3, 3), as where somebody sees the vehicle now.
@@ -275,7 +215,7 @@ class Localiser:
 
     def _expect(self, correction: np.ndarray, belief: Belief) -> None:
         self.estimator.start_from(belief, correction)
-        self._live.start_from(correction)
+        self.following.start_from(correction)
         self._search.expect()
 
     def check_time(self, time: float) -> None:
@@ -297,10 +237,7 @@ class Localiser:
     def follow(self, track: Track, time: float) -> None:
         """Bring the belief to `time` [s] by the odometry, which `track` knows from `silent_since` on."""
         with self._lock:
-            self._odometry.take(track)
-            followed = self._odometry.followed(track)
-            self.estimator.follow(followed, time)
-            self._age.learn_odometry(time, followed.at(np.array(time)))
+            self.estimator.follow(self.following.followed(track, time), time)
 
     def relocalise(self) -> Optional[ScanUpdate]:
         """Search the whole map for the newest scan, and take the place that is found as the vehicle's.
@@ -311,25 +248,19 @@ class Localiser:
             scan = self._newest
             if scan is None:
                 return None
-            update = self._adopted(scan, self._found(scan))
+            result = relocalised(scan, self.estimator.target, self._settings.anywhere, self.estimator.errors)
+            update = self._adopted(scan, result)
             if update.accepted:
                 self._search.forget()
-                self._live.believe(update.belief)
+                self.following.believe(update.belief)
         return update
 
     def _searched(self, scan: Scan) -> ScanUpdate:
         """Search the whole map for a scan, and then where the vehicle was expected: few echoes may look like chance."""
-        result, errors = self._found(scan), self.estimator.errors
-        if result.accepted:
-            found = FoundPlace(belief_of_match(scan, result, errors), scan.reference_pose)
-            if not self._search.confirms(found, errors):
-                result = replace(result, status=MatchStatus.AMBIGUOUS, reason=_UNCONFIRMED)
+        estimator = self.estimator
+        result = self._search.found(scan, estimator.target, self._settings.anywhere, estimator.errors)
         update = self._adopted(scan, result)
-        return update if update.accepted or not self._search.may_be_near else self.estimator.add_scan(scan)
-
-    def _found(self, scan: Scan) -> MatchResult:
-        """Search the whole map for a scan."""
-        return relocalised(scan, self.estimator.target, self._settings.anywhere, self.estimator.errors)
+        return update if update.accepted or not self._search.may_be_near else estimator.add_scan(scan)
 
     def _adopted(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Take the place where a scan was found as the vehicle's."""
@@ -393,7 +324,7 @@ class Localiser:
         with self._lock:
             belief, copies = self.estimator.belief, {one: self.estimator.map_of(one).begin_copy() for one in Layer}
             # After a step a run goes on only in this process, which knows it.
-            keyframes = self.estimator.keyframes if run and not self.steps else {}
+            keyframes = self.estimator.keyframes if run and not self.following.steps else {}
             correction = self.last_correction
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
         if self.origin is not None:
@@ -433,8 +364,5 @@ class Localiser:
         return count
 
     def _forget_scans(self) -> None:
-        self._live.clear()
-        self._odometry.clear()
-        self._age.clear()
-        self._causes.clear()
-        self._newest = self._came = self._resumed_at = None
+        self.following.clear()
+        self._newest = self._resumed_at = None

@@ -13,20 +13,17 @@ from mlsm_manager.joint_solver.run_log import stacked, unstacked
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.scan_matching.judgement import agreement
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, carried_on
+from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.scan_matching.scan_path import POSE, POSITION, STATES, YAW
+from mlsm_manager.scan_matching.scan_path import POSE, STATES
 from mlsm_manager.surface_map.blocks import ROW_WIDTH
 from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, inverse, wrapped
+from node_support.geometry import composed, inverse
 
 # m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
 _STRAYED = np.array([1.0, 1.0, 0.1])
 _LONGEST_BRIDGE = 30.0  # s: in one or two turns of a head a vehicle hardly leaves a straight line
-_SURE = 3.0  # standard deviations by which two places of one vehicle may differ
-_FARTHEST = 10.0  # m: where the odometry since a scan is less sure, the next one confirms nothing
-_MOST_REJECTED = 3  # scans in a row that do not match show that the vehicle is elsewhere
 # In simulated tours and a marina 0.85 to 1 of a scan lie on the map where the vehicle is, and the two agree by 0.44 to
 # 0.98; of scans 5 m or more aside that agree by 0.4 with the map, 0.81 at most lie on it.
 _LEAST_EXPLAINED, _LEAST_AGREEMENT = 0.83, 0.4
@@ -79,77 +76,6 @@ class StoredPlace:
         covariance = self.belief.covariance.copy()
         covariance[POSE, POSE] += np.diag(_STRAYED**2)
         return Belief(self.belief.time, self.belief.theta, covariance)
-
-
-@dataclass(frozen=True)
-class FoundPlace:
-    """Where a scan was found somewhere in the map, when the odometry said T_odom_base (3,)."""
-
-    belief: Belief
-    T_odom_base: np.ndarray
-
-    def leads_to(self, later: "FoundPlace", errors: OdometryErrors) -> bool:
-        """Return whether the odometry, which errs by `errors`, goes from here to a place that was found later."""
-        expected = carried_on(self.belief, self.T_odom_base, later.T_odom_base, later.belief.time, errors)
-        difference = (later.belief.theta - expected.theta)[POSE]
-        difference[YAW] = wrapped(difference[YAW])
-        covariance = (expected.covariance + later.belief.covariance)[POSE, POSE]
-        is_near = difference @ np.linalg.solve(covariance, difference) < _SURE**2
-        return bool(is_near and np.trace(expected.covariance[POSITION, POSITION]) < _FARTHEST**2)
-
-
-class PlaceSearch:
-    """Decides, scan by scan after a map was loaded, whether the place is known, expected or lost."""
-
-    def __init__(self) -> None:
-        self.forget()
-
-    def forget(self) -> None:
-        """Take the place as known."""
-        self._left: Optional[int] = None
-        self._is_expected = False
-        self._found: Optional[FoundPlace] = None
-
-    def expect(self) -> None:
-        """Take the place as near to where it is expected."""
-        self._left = _MOST_REJECTED
-        self._is_expected = True
-
-    def lose(self) -> None:
-        """Take the place as anywhere in the map."""
-        self.forget()
-        self._left = 0
-
-    def jump(self) -> None:
-        """Learn that time jumped: what was expected does not hold any more."""
-        if self._left is not None:
-            self.lose()
-
-    @property
-    def is_lost(self) -> bool:
-        """Whether the whole map must be searched."""
-        return self._left == 0
-
-    @property
-    def may_be_near(self) -> bool:
-        """Whether the vehicle may still be where it is expected, also when the whole map is searched."""
-        return self._is_expected
-
-    def learn(self, accepted: bool) -> None:
-        """Learn whether a scan was matched."""
-        if accepted:
-            self.forget()
-        elif self._left:
-            self._left -= 1
-
-    def confirms(self, found: FoundPlace, errors: OdometryErrors) -> bool:
-        """Return whether a place where a scan was found is that to which the one found before leads.
-
-        A basin looks alike from both ends: some scans of the end that the map does not have are found at the other, but
-        seldom two in a row (`scripts/bench lost`).
-        """
-        before, self._found = self._found, found
-        return before is not None and before.leads_to(found, errors)
 
 
 @dataclass(frozen=True)

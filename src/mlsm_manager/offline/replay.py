@@ -229,5 +229,5 @@ def replay(
 
 def _corrections(localiser: Localiser, track: Track, start: int, end: int) -> np.ndarray:
     """Return T_map_odom (end - start, 3) at the track's times from number `start` to before number `end`."""
-    found = [localiser.correction(float(track.times[one]), track.poses[one]) for one in range(start, end)]
+    found = [localiser.following.correction(float(track.times[one]), track.poses[one]) for one in range(start, end)]
     return np.array(found).reshape(-1, 3)

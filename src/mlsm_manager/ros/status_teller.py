@@ -82,7 +82,7 @@ class StatusTeller:
         place, T_map_base = self._place_now()
         if place is not None:
             report_place(self._health, place)
-        causes = self._localiser.causes()
+        causes = self._localiser.following.causes()
         report_causes(self._health, causes)
         stages = (*self.stages_before, self._health)
         silent = {topic: seconds for stage in stages for topic, seconds in stage.silent().items()}
@@ -93,7 +93,7 @@ class StatusTeller:
             self._publish(state, text, place, T_map_base)
 
     def _look_and_tell(self) -> None:
-        self._localiser.look_for_causes()
+        self._localiser.following.look_for_causes()
         self.tell()
 
     def _place_now(self) -> Tuple[Optional[PlaceNow], Optional[np.ndarray]]:

@@ -1,14 +1,16 @@
 """What is wrong with a recording is found and named, and what a vehicle cannot have done is mended."""
 
+from time import monotonic
+
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring
 
-from mlsm_manager.localisation.continuous_input import continuous_scan
+from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, impossible_steps
+from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
 from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
@@ -99,9 +101,9 @@ def test_headings_that_tremble_are_smoothed(begin):
 
 def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on():
     noise = np.radians(5.0) * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
-    scan, odometry = scans_in(broken.with_compass_error(WHOLE, noise, False))[2], ContinuousOdometry(LIMITS)
-    track = continuous_scan(odometry, scan).track
-    assert [step.text for step in odometry.trembling] == ["the compass trembles by about 5 deg"]
+    scan, following = scans_in(broken.with_compass_error(WHOLE, noise, False))[2], Following(LIMITS, 1.0, monotonic)
+    track = following.taken(scan).track
+    assert [cause.text for cause in following.causes()] == ["the compass trembles by about 5 deg"]
     assert np.degrees(np.std(track.poses[:, 2] - WHOLE.track.at(track.times)[:, 2])) < 2.0
 
 
@@ -222,8 +224,8 @@ def test_scans_that_are_not_matched_are_not_compared():
     localiser.match(False)
     for scan in scans_in(broken.mount_turned(WHOLE, 120.0)):
         localiser.take_scan(scan)
-    localiser.look_for_causes()
-    assert localiser.causes() == []
+    localiser.following.look_for_causes()
+    assert localiser.following.causes() == []
 
 
 def test_causes_are_ranked_by_evidence_and_what_was_mended_comes_last():

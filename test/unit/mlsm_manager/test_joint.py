@@ -210,10 +210,10 @@ def test_a_jump_of_the_odometry_leaves_position_and_map_where_they_are(size):
         update = jumped.take_scan(replace(scan, points=points, track=Track(track.times, poses))).scan
         other = whole.take_scan(scan).scan
         assert np.hypot(*(update.belief.theta - other.belief.theta)[:2]) < 0.5
-    (step,) = jumped.steps
+    (step,) = jumped.following.steps
     assert step.time == pytest.approx(moment, abs=0.5)
     now, pose = SCANS[8].reference_time, SCANS[8].reference_pose
-    places = [composed(one.correction(now + 1.0, odom), odom) for one, odom in (
+    places = [composed(one.following.correction(now + 1.0, odom), odom) for one, odom in (
         (jumped, pose + size * np.array([1.0, 0.5, 0.0])), (whole, pose)
     )]  # fmt: skip
     assert np.hypot(*(places[0] - places[1])[:2]) < 0.5
@@ -291,9 +291,9 @@ def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
         localiser, _ = localiser_after(6)
         end, pose = SCANS[5].track.times[-1], SCANS[5].track.poses[-1]
         expected = localiser.last_correction
-        localiser.correction(end, pose)
+        localiser.following.correction(end, pose)
         assert localiser.notice_time(end + 1.0 + hour, pose) * hour < 0.0
-        np.testing.assert_allclose(localiser.correction(end + 1.0 + hour, pose), expected, atol=1e-9)
+        np.testing.assert_allclose(localiser.following.correction(end + 1.0 + hour, pose), expected, atol=1e-9)
         later = SCANS[6]
         track = Track(later.track.times + hour, later.track.poses)
         found = localiser.take_scan(replace(later, times=later.times + hour, track=track,
@@ -303,7 +303,7 @@ def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
 
 def test_an_hour_in_which_the_vehicle_went_elsewhere_is_no_jump_of_the_clock():
     localiser, _ = localiser_after(3)
-    localiser.correction(SCANS[2].reference_time, SCANS[2].reference_pose)
+    localiser.following.correction(SCANS[2].reference_time, SCANS[2].reference_pose)
     assert localiser.notice_time(SCANS[2].reference_time + 3600.0, np.array([40.0, 0.0, 0.0])) == 0.0
 
 

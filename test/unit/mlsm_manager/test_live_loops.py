@@ -115,7 +115,7 @@ def mapped():
     for scan in scans:
         updates.append(localiser.take_scan(scan).scan)
         times = scan.reference_time + np.linspace(0.1, 13.0, 100)
-        shown.append([localiser.correction(time, track.at(time)) for time in times])
+        shown.append([localiser.following.correction(time, track.at(time)) for time in times])
     return localiser, updates, np.array(shown)
 
 

@@ -37,7 +37,7 @@ def test_the_correction_moves_to_a_fix_within_the_blend_time():
     localiser, taken = localiser_after(3)
     end, pose = taken[-1].scan.scan.reference_time, taken[-1].scan.scan.reference_pose
     for time in (end, end + 2.0):
-        correction = localiser.correction(time, pose)
+        correction = localiser.following.correction(time, pose)
     np.testing.assert_allclose(correction, taken[-1].scan.result.correction(taken[-1].scan.scan), atol=0.05)
 
 
@@ -148,13 +148,13 @@ def test_under_an_odometry_without_stamps_a_fix_is_blended_in_and_then_holds():
     clock = Clock()
     settings = PARAMETERS.localiser_settings()
     localiser = Localiser(PARAMETERS.build_localiser().estimator, settings, MotionLimits(), clock)
-    np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))
+    np.testing.assert_array_equal(localiser.following.standing_correction(np.zeros(3)), np.zeros(3))
     localiser.take_scan(scan_of(harbour(), still()))
-    np.testing.assert_array_equal(localiser.standing_correction(np.zeros(3)), np.zeros(3))
+    np.testing.assert_array_equal(localiser.following.standing_correction(np.zeros(3)), np.zeros(3))
     localiser.take_scan(scan_of(harbour(), still((1.0, 0.0, 0.0)), still(), start=SECONDS))
     found = []
     for clock.now in (100.0, 100.5, 102.0, 5000.0):
-        found.append(localiser.standing_correction(np.zeros(3))[0])
+        found.append(localiser.following.standing_correction(np.zeros(3))[0])
     assert abs(found[0]) < 1e-9 < found[1] < found[2] == found[3] == pytest.approx(localiser.last_correction[0])
     assert localiser.believed_until == 2 * SECONDS
 

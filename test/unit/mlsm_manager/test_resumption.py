@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from made_scans import SECONDS, at_velocity, drifting, elsewhere, harbour, scan_of, still
 
+from mlsm_manager.localisation.lost_vehicle import FoundPlace, PlaceSearch
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.localisation.resumption import FoundPlace, PlaceSearch, StoredPlace
+from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchStatus, Track
 from mlsm_manager.scan_matching.scan_path import POSE
@@ -55,7 +56,7 @@ def test_a_killed_node_goes_on_where_its_odometry_has_drifted_to(stored):
 
 def test_until_the_first_scan_the_stored_correction_is_shown(stored):
     localiser = restored(stored, same_odometry=True)
-    shown = localiser.correction(100.0, np.zeros(3))
+    shown = localiser.following.correction(100.0, np.zeros(3))
     np.testing.assert_allclose(shown, stored.arrays["T_map_odom"], rtol=0.0, atol=1e-12)
 
 
@@ -98,11 +99,8 @@ def found_place(time, pose, T_odom_base):
 def test_a_place_is_confirmed_where_the_odometry_leads_to_the_next_one(aside, confirms):
     """Scans of water that the map does not have are each found on another part of it."""
     odometry, place, step = np.array([30.0, -20.0, 2.0]), np.array([4.0, 5.0, 0.5]), np.array([4.0, 1.0, 0.3])
-    search = PlaceSearch()
-    search.lose()
-    assert not search.confirms(found_place(100.0, place, odometry), OdometryErrors())
     later = found_place(116.0, composed(place, step) + np.array(aside), composed(odometry, step))
-    assert search.confirms(later, OdometryErrors()) == confirms
+    assert found_place(100.0, place, odometry).leads_to(later, OdometryErrors()) == confirms
 
 
 def test_after_a_time_in_which_the_odometry_strays_far_the_next_scan_confirms_nothing(stored):
