@@ -5,15 +5,15 @@ from typing import Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations, misfit_covariance
+from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_window import LiveWindow, superfluous
 from mlsm_manager.joint_solver.loops import Bend, ClosedLoop, Loop, confirmed, with_newest
-from mlsm_manager.joint_solver.map_support import misfit_variances
+from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_newest
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
-from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, YAW, State
+from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.place_search import place_after_silence, searched_node, silent_scans, submap_place
+from mlsm_manager.joint_solver.place_search import put_newest, silent_scans, submap_place
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog, stacked, unstacked
@@ -25,7 +25,6 @@ ODOMETRY = "odometry"
 """Name under which the name of a run's model is stored."""
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
-_UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 _PULLED_STEPS = 5  # with the pull of loops: comparisons meet by then
 _FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
@@ -56,8 +55,7 @@ class LiveSolver:
         self.odometry = parameters.odometry
         self.estimates: List[Optional[LiveEstimate]] = []
         self.state = State(self.odometry.first_node()[np.newaxis], parameters.run_mean(log))
-        # Of the poses of those nodes that stay where they were found; m^2, of the place, for each turn of the head.
-        self._covariances, self._misfits = np.empty((0, POSE_COLUMNS, POSE_COLUMNS)), np.empty(0)
+        self._frozen = FrozenPlaces(np.empty((0, POSE_COLUMNS, POSE_COLUMNS)), np.empty(0))
         self._start, self._known = start, known
         self.submaps = Submaps(np.empty(0))
         self.fixes = Fixes()
@@ -73,9 +71,9 @@ class LiveSolver:
         return {
             ODOMETRY: name_of(self.odometry),
             "nodes": self.state.nodes.copy(),
-            "node_covariances": self._covariances,
+            "node_covariances": self._frozen.covariances,
             "run_unknowns": self.state.run.copy(),
-            "misfits": self._misfits,
+            "misfits": self._frozen.misfits,
             "start": np.empty(0) if self._start is None else self._start,
             "known": np.empty((0, 2)) if self._known is None else self._known.places,
             _SUBMAPS: self.submaps.numbers,
@@ -115,7 +113,7 @@ class LiveSolver:
         if nodes.shape != (scans + 1, width) or covariances.shape[1:] != (POSE_COLUMNS, POSE_COLUMNS):
             raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {scans} scans")
         self.state = State(nodes, stored["run_unknowns"]).copy()
-        self._covariances, self._misfits = covariances, stored["misfits"]
+        self._frozen = FrozenPlaces(covariances, stored["misfits"])
 
     def begun_with(self, parameters: SolverParameters, log: RunLog) -> "LiveSolver":
         """Return a solver with other parameters that begins where this one began; log: without scans."""
@@ -217,14 +215,21 @@ class LiveSolver:
         else:
             self._start_at(fix)
         window = self._fitted()
-        if self.submaps.is_apart and self._join(window.estimates(1)[0]):
-            window = self._fitted()
+        if self.submaps.is_apart:
+            self.search = submap_place(self.solution, window.estimates(1)[0].covariance[:2, :2])
+            if self.search.is_certain:
+                self.solution.move_newest(self.search.moves)
+                self.submaps.join()
+                window = self._fitted()
         self.closed = None
         if self._may_close:
             window = self._closed(window)
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
-        self._covariances = np.append(self._covariances[: window.oldest], covariances, axis=0)
-        variance = self._misfit_variance()
+        self._frozen = FrozenPlaces(
+            np.append(self._frozen.covariances[: window.oldest], covariances, axis=0),
+            misfits_with_newest(self.solution, self._frozen.misfits),
+        )
+        variance = float(self._frozen.misfits.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
         return [replace(estimate, misfit_variance=variance) for estimate in estimates]
 
     @property
@@ -249,16 +254,9 @@ class LiveSolver:
         self.fixes.by_node[node] = fix
         self.state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([node]))[0, :YAW]
 
-    def _misfit_variance(self) -> float:
-        """Return that of the place after the newest turn [m^2]; the newest turns are judged where they are put now."""
-        first = max(0, self.log.scan_count // self._parts - _UNSETTLED_TURNS)
-        newest = misfit_variances(self.solution, first)
-        self._misfits = np.append(self._misfits[:first], newest)
-        return float(self._misfits.sum()) + (0.0 if self._by_parts is None else self._by_parts.variance)
-
     def _fitted(self, bend: Optional[Bend] = None) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution; loops only pull them near."""
-        window = LiveWindow(self.solution, self.estimates, self._covariances, self._start)
+        window = LiveWindow(self.solution, self.estimates, self._frozen.covariances, self._start)
         cut = self.parameters.wide_cut
         for _ in range(_PULLED_STEPS if bend else 0):
             window.step(cut, bend)
@@ -278,10 +276,8 @@ class LiveSolver:
         loops = confirmed(self._loops, self.log.scan_count - 1)
         if not loops:
             return window
-        oldest, before = window.oldest, window.log_likelihood()
-        covariances = np.append(self._covariances[:oldest], window.covariances_of_oldest(0), axis=0)
-        places = (covariances + misfit_covariance(self._misfits_until[: oldest + 1]))[:, :2, :2]
-        now = self.state
+        now, before = self.state, window.log_likelihood()
+        places = self._frozen.places(window.oldest, window.covariances_of_oldest(0))
         bend = Bend.of(loops, now, places)
         found = [self._bent(bend, share) for share in bend.tried]
         likelihood, share, state = max(found, key=lambda one: one[0])
@@ -289,7 +285,7 @@ class LiveSolver:
             self.state = now
             return window
         self.state = state
-        self._know_better(bend.left(share, np.trace(places, axis1=1, axis2=2))[:oldest])
+        self._frozen = self._frozen.better(bend.left(share, np.trace(places, axis1=1, axis2=2))[: window.oldest])
         self._loops = ()
         self.fixes = Fixes()  # in the map as it was
         seconds = self.log.node_times[-1] - self.log.node_times[loops[-1].older + 1]
@@ -304,20 +300,6 @@ class LiveSolver:
         return window.log_likelihood() - bend.cost(share), share, self.state
 
     @property
-    def _misfits_until(self) -> np.ndarray:
-        """(n,) m^2, sum of the misfits until each node, those of whole turns; 0 beyond the turns that are judged."""
-        known = np.cumsum(np.append(0.0, self._misfits))
-        return known[np.minimum(np.arange(len(self.state.nodes)), len(known) - 1)]
-
-    def _know_better(self, left: np.ndarray) -> None:
-        """Take away from the variance of the first nodes' places all but the share `left` (n,)."""
-        misfits = self._misfits_until
-        misfits[: len(left)] *= left
-        self._misfits = np.diff(misfits)[: len(self._misfits)]
-        self._covariances = self._covariances.copy()
-        self._covariances[: len(left)] *= left[:, np.newaxis, np.newaxis]
-
-    @property
     def found(self) -> str:
         """How the vehicle was found again with the newest scan after a silence; empty where it was not."""
         return self.search.line() if self.search is not None and self.search.is_certain else ""
@@ -328,18 +310,8 @@ class LiveSolver:
             self._search_by_parts()
             return
         silent = silent_scans(self.log)
-        if len(self.estimates) <= silent:
-            return
-        covariance = self.estimates[-1 - silent].own_covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
-        parameters = self.parameters
-        if silent:
-            self.search = place_after_silence(self.solution, covariance, silent)
-        if self.search is not None and self.search.is_certain and not self.submaps.is_apart:
-            self._move(self.search.moves)
-        elif self.search is not None and self.search.reach > parameters.wide_cut:
-            self.submaps.begin()
-        else:
-            self._search_beside_scan_before(covariance)
+        if len(self.estimates) > silent:
+            self.search = put_newest(self.solution, self.estimates[-1 - silent].own_covariance, silent)
 
     def _search_by_parts(self) -> None:
         """Put the newest nodes where the search for nodes finds them likeliest."""
@@ -348,24 +320,6 @@ class LiveSolver:
             starts_known = self._known is not None or self._start is not None
             placed = self._by_parts.placed(self.log, self.state.nodes, self.parameters, starts_known)
             self.state.nodes[-len(placed) :] = placed
-
-    def _search_beside_scan_before(self, covariance: np.ndarray) -> None:
-        """Put the newest node where its scan fits to the scans before; covariance: of the node before it."""
-        first = self.submaps.start
-        self.state.nodes[-1] = searched_node(self.solution, covariance, first)
-
-    def _join(self, estimate: LiveEstimate) -> bool:
-        """Put the newest scans, which lie apart, into the map if they fit at one place; return whether they did."""
-        covariance = estimate.covariance[:2, :2]
-        self.search = submap_place(self.solution, covariance)
-        if self.search.is_certain:
-            self._move(self.search.moves)
-            self.submaps.join()
-        return self.search.is_certain
-
-    def _move(self, moves: np.ndarray) -> None:
-        """Move the newest nodes by `moves` (k, width)."""
-        self.state.nodes[-len(moves) :] += moves
 
 
 def name_of(odometry: OdometryModel) -> np.ndarray:

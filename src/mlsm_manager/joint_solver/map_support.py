@@ -1,11 +1,13 @@
 """How far scans lie on the surfaces that other scans heard, and what that tells of errors the solver cannot know."""
 
+from dataclasses import dataclass
 from typing import Sequence, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
+from mlsm_manager.joint_solver.estimate import misfit_covariance
 from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -17,6 +19,7 @@ _CANDIDATES = 24  # points heard before that are looked at for each point: enoug
 _FEWEST_POINTS = 2.0  # points with surfaces around them: fewer tell nothing
 _TURNS_BEFORE = 10  # a few minutes, in which a vehicle sees the same
 _FITS = 0.65  # share of a turn's points on what was heard before from which on it fits; as in self_check.scans_go_on
+_UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
 _SPEED = 0.5  # m/s: the usual speed of a small vehicle; nothing else tells how far it went
 _ON_PLANE = 1.0  # deviations within which a point lies on the plane of the one that it is compared with
 Met = Sequence[Tuple[Pairs, PlacedPoints, PlacedPoints]]
@@ -92,6 +95,40 @@ def misfit_variances(solution: Solution, first: int) -> np.ndarray:
     shares = shares_heard_before(solution, first)
     misfit = np.clip(1.0 - np.where(np.isfinite(shares), shares, _FITS) / _FITS, 0.0, 1.0)
     return misfit * (_SPEED * np.diff(times)) ** 2
+
+
+@dataclass(frozen=True)
+class FrozenPlaces:
+    """How uncertain nodes are that stay where they were found.
+
+    covariances: (f, 3, 3) of their poses. misfits: (n,) m^2, of the place, for each turn of the head.
+    """
+
+    covariances: np.ndarray
+    misfits: np.ndarray
+
+    def _until(self, nodes: int) -> np.ndarray:
+        """Return the sum of the misfits of whole turns up to each node (nodes,) m^2; as the last one beyond them."""
+        known = np.cumsum(np.append(0.0, self.misfits))
+        return known[np.minimum(np.arange(nodes), len(known) - 1)]
+
+    def places(self, count: int, following: np.ndarray) -> np.ndarray:
+        """Return the covariances (count + k, 2, 2) of the first places, and of those with poses `following` them."""
+        covariances = np.append(self.covariances[:count], following, axis=0)
+        return (covariances + misfit_covariance(self._until(len(covariances))))[:, :2, :2]
+
+    def better(self, left: np.ndarray) -> "FrozenPlaces":
+        """Return them with only the share `left` (n,) of the variance of the first ones."""
+        until, covariances = self._until(max(len(left), len(self.misfits)) + 1), self.covariances.copy()
+        until[: len(left)] *= left
+        covariances[: len(left)] *= left[:, np.newaxis, np.newaxis]
+        return FrozenPlaces(covariances, np.diff(until)[: len(self.misfits)])
+
+
+def misfits_with_newest(solution: Solution, misfits: np.ndarray) -> np.ndarray:
+    """Return those of all turns (n,) m^2; the newest ones are judged where they are put now."""
+    first = max(0, solution.log.scan_count // solution.parameters.parts_per_turn - _UNSETTLED_TURNS)
+    return np.append(misfits[:first], misfit_variances(solution, first))
 
 
 def agreement(met: Met, scan: int, parameters: SolverParameters) -> Tuple[float, float, np.ndarray]:

@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.map_support import Surfaces, nearness
 from mlsm_manager.joint_solver.motion_models import Transition
-from mlsm_manager.joint_solver.normal_equations import POSE, YAW, State
+from mlsm_manager.joint_solver.normal_equations import POSE, RUN_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.places import (
     FEWEST_POINTS,
@@ -41,6 +41,23 @@ _FEW_POINTS = 50  # of it, while many turns are compared
 _KNOWN_TURN = 0.1  # rad, deviation: the solver's own steps find turns of less than twice as much
 _TURN_CELL = 0.08  # rad: moves an echo 20 m away by less than twice a cell
 _LEAST_LEFT = 1e-6  # rad^2: of the heading, once a turn is chosen
+
+
+def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
+    """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin a submap.
+
+    covariance: of the node before the newest scan and the `silent` scans before that, and of the run's unknowns. Return
+    what came of the search in the whole map; None where none was needed.
+    """
+    covariance = covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+    found = place_after_silence(solution, covariance, silent) if silent else None
+    if found is not None and found.is_certain and not solution.submaps.is_apart:
+        solution.move_newest(found.moves)
+    elif found is not None and found.reach > solution.parameters.wide_cut:
+        solution.submaps.begin()
+    else:
+        solution.state.nodes[-1] = searched_node(solution, covariance, solution.submaps.start)
+    return found
 
 
 def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) -> np.ndarray:

@@ -174,6 +174,10 @@ class Solution:
         """Return the run with other unknowns."""
         return replace(self, state=state)
 
+    def move_newest(self, moves: np.ndarray) -> None:
+        """Move the newest nodes by `moves` (k, width)."""
+        self.state.nodes[-len(moves) :] += moves
+
     def placed(self, rows: np.ndarray) -> PlacedPoints:
         """Return the surface points in `rows` (n,) int of the log in the map."""
         return self._placed(self.log.surfaces, rows)
