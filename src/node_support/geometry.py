@@ -27,6 +27,11 @@ def unwrapped(angle: float, near: float) -> float:
     return near + wrapped(angle - near)
 
 
+def grid(line: np.ndarray) -> np.ndarray:
+    """Return the points (n, 2) of a square grid with sides `line`."""
+    return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
     # On a column of a table numpy picks between two sines by where in memory the result lies; they differ in the last

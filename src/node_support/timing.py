@@ -1,8 +1,8 @@
-"""Time that keeps step with the wall clock, and events that should have come by now."""
+"""Time that keeps step with the wall clock, events that should have come by now, and stretches of time."""
 
 import time
 from collections import deque
-from typing import Callable, Deque
+from typing import Callable, Deque, List
 
 import numpy as np
 
@@ -58,3 +58,8 @@ class UsualInterval:
     def overdue(self, time: float) -> float:
         """Return by how many seconds it is overdue at `time` [s]; 0 until it came twice."""
         return max(time - self._due, 0.0)
+
+
+def stretches(holds: np.ndarray) -> List[List[int]]:
+    """Return where each run of what `holds` (n,) begins, and the number after its end."""
+    return np.flatnonzero(np.diff(np.concatenate([[0], holds, [0]]).astype(int))).reshape(-1, 2).tolist()

@@ -22,12 +22,12 @@ from mlsm_manager.joint_solver.places import (
     Freedom,
     PlaceCandidate,
     best_place,
-    grid,
     moved,
     places_within,
 )
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import MAP, Solution
+from node_support.geometry import grid
 
 _KNOWN = 2.0  # deviations of the motion within the cut, and the solver's own steps do
 _SUBMAP_SCANS = 6  # the newest ones of a submap that are looked for: older ones may lie in water that the map has not

@@ -11,6 +11,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.map_support import Surfaces
 from mlsm_manager.joint_solver.placement import PlacedPoints
+from node_support.geometry import grid
 
 FEWEST_POINTS = 25
 """On surfaces, that a scan must hear to tell a place: fewer fit anywhere."""
@@ -123,11 +124,6 @@ def places_within(covariance: np.ndarray, most: int) -> np.ndarray:
     shifts = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(covariance))
     return np.concatenate([np.zeros((1, 2)), shifts[distance <= REACH**2]])
-
-
-def grid(line: np.ndarray) -> np.ndarray:
-    """Return the points (n, 2) of a square grid."""
-    return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
 def moved(sources: PlacedPoints, ends: np.ndarray) -> np.ndarray:

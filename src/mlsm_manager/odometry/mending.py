@@ -10,6 +10,7 @@ from mlsm_manager.odometry.steps import LEAST_STEP, ContinuousOdometry, MotionLi
 from mlsm_manager.odometry.trembling import with_headings_smoothed
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import rotated, wrapped
+from node_support.timing import stretches
 
 _YAW = 2  # column of poses
 _STANDS_FOR = 10.0  # s of equal poses: longer than any odometry waits between two of them
@@ -49,23 +50,22 @@ def standing_stretches(track: Track, first_column: int = 0) -> Iterator[Tuple[in
     A heading that is measured trembles, so that a pose stands only where nobody measures it, or in a simulation.
     first_column: 2 for stretches in which the heading does not change.
     """
-    same = np.concatenate([[False], (np.diff(track.poses[:, first_column:], axis=0) == 0.0).all(axis=1), [False]])
-    for first, last in np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2):
+    for first, last in stretches((np.diff(track.poses[:, first_column:], axis=0) == 0.0).all(axis=1)):
         if track.times[last] - track.times[first] >= _STANDS_FOR:
-            yield int(first), int(last)
+            yield first, last
 
 
 def stuck_headings(track: Track) -> List[Tuple[float, float]]:
     """Return when [s] the heading stood while positions went on, if it trembles elsewhere as measured ones do."""
-    stretches, stuck = list(standing_stretches(track, _YAW)), np.zeros(len(track.times) - 1, dtype=bool)
-    for first, last in stretches:
+    standing, stuck = list(standing_stretches(track, _YAW)), np.zeros(len(track.times) - 1, dtype=bool)
+    for first, last in standing:
         stuck[first:last] = True
     turns = np.sign(np.diff(track.poses[:, _YAW]))[~stuck]
     if len(turns) < _TURNS or np.mean(turns[1:] * turns[:-1] < 0.0) < _TO_AND_FRO:
         return []
     return [
         (float(track.times[first]), float(track.times[last]))
-        for first, last in stretches
+        for first, last in standing
         if np.hypot(*np.ptp(track.poses[first : last + 1, :2], axis=0)) > _GOES
     ]
 

@@ -10,6 +10,7 @@ import numpy as np
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, wrapped
 from node_support.parameters import ParameterSet, parameter
+from node_support.timing import stretches
 
 LEAST_STEP = np.array([0.3, np.radians(4.0)])  # m, rad: less is noise of a DVL or compass
 _LARGEST_ACCELERATION = np.array([5.0, 3.0])  # m/s^2, rad/s^2: half of gravity; from rest to a turn in two seconds
@@ -202,9 +203,8 @@ class Stall(NamedTuple):
 
 def stalls(track: Track) -> List[Stall]:
     """Return where the pose stood for seconds, though no vehicle stops and starts so suddenly."""
-    same = np.concatenate([[False], (np.diff(track.poses, axis=0) == 0.0).all(axis=1), [False]])
-    stretches = np.flatnonzero(np.diff(same.astype(int))).reshape(-1, 2)
-    found = (_stall(track, int(first), int(last)) for first, last in stretches if last + 1 < len(track.times))
+    same = stretches((np.diff(track.poses, axis=0) == 0.0).all(axis=1))
+    found = (_stall(track, first, last) for first, last in same if last + 1 < len(track.times))
     return [stall for stall in found if stall is not None]
 
 

@@ -5,6 +5,7 @@ from typing import Callable, List, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.self_check.causes import Cause
+from node_support.timing import stretches
 from sonar_processing.beams.beam import PlacedBeam
 
 _CERTAIN = 500.0  # nats: of what needs no comparison of scans to be seen
@@ -43,11 +44,10 @@ def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
 
 def _standing(times: np.ndarray, angles: np.ndarray) -> List[Cause]:
     """Return stretches in which the head reports one angle, unless it never turns."""
-    still = np.concatenate([[False], np.abs(np.angle(np.exp(1j * np.diff(angles)))) < _STILL, [False]])
-    if still[1:-1].mean() > 0.9:
+    still = np.abs(np.angle(np.exp(1j * np.diff(angles)))) < _STILL
+    if still.mean() > 0.9:
         return []
-    stretches = np.flatnonzero(np.diff(still.astype(int))).reshape(-1, 2)
-    found = [(float(times[first]), float(times[last] - times[first])) for first, last in stretches]
+    found = [(float(times[first]), float(times[last] - times[first])) for first, last in stretches(still)]
     return [
         Cause(f"the head stood for {seconds:.0f} s,", _CERTAIN, begin, metres=_gone(seconds))
         for begin, seconds in found
@@ -69,11 +69,10 @@ def _stuck(times: np.ndarray, beams: Sequence[PlacedBeam]) -> Optional[Cause]:
         return None
     near = np.ones(6 * apart + 1) / (6 * apart + 1)
     share = np.convolve(np.where(told, values, np.inf) < _ALIKE, near, "same")
-    alike = np.concatenate([[False], share > _MOSTLY, [False]])
-    stretches = np.flatnonzero(np.diff(alike.astype(int))).reshape(-1, 2)
-    if not len(stretches):
+    alike = stretches(share > _MOSTLY)
+    if not alike:
         return None
-    first, last = max(stretches.tolist(), key=lambda one: times[one[1]] - times[one[0]])
+    first, last = max(alike, key=lambda one: times[one[1]] - times[one[0]])
     seconds = float(times[last] - times[first])
     if seconds < _STANDS / 2.0:
         return None
@@ -96,9 +95,7 @@ def _blind(angles: np.ndarray, hears: np.ndarray) -> Optional[Cause]:
     if looked.min() < 10:
         return None
     share = np.bincount(sector, hears, minlength=_SECTORS) / looked
-    deaf = np.append(share < _DEAF, share < _DEAF)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], deaf, [False]]).astype(int))).reshape(-1, 2)
-    longest = max((last - first for first, last in edges), default=0)
+    longest = max((last - first for first, last in stretches(np.tile(share < _DEAF, 2))), default=0)
     if not _BLIND <= longest < _SECTORS or np.median(share[share >= _DEAF]) < _HEARS:
         return None
     degrees = 360.0 * longest / _SECTORS

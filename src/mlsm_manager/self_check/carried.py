@@ -10,6 +10,7 @@ import numpy as np
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.hypotheses import NearPairs, ScanPairs, evidence_of
+from node_support.geometry import grid
 
 _SPEEDS = np.arange(-0.6, 0.61, 0.15)  # m/s, along x and y: currents that a small vehicle is used in
 _FINER = (0.05, 0.02)  # m/s
@@ -52,7 +53,7 @@ def _likeliest(pairs: ScanPairs, near: NearPairs) -> Optional[_Stretch]:
     }
     if not inside:
         return None
-    speeds = np.stack(np.meshgrid(_SPEEDS, _SPEEDS), axis=-1).reshape(-1, 2)
+    speeds = grid(_SPEEDS)
     needed = np.any(list(inside.values()), axis=0)
     table = np.full((len(speeds), len(needed)), np.nan)
     table[:, needed] = pairs.carried(near.pairs[needed], speeds)
@@ -80,7 +81,6 @@ def _refined(pairs: ScanPairs, near: NearPairs, found: _Stretch) -> np.ndarray:
     """Return the velocity (2,) [m/s] more exactly than it was looked for."""
     velocity, chosen = found.velocity, near.pairs[near.within(found.first, found.last)]
     for step in _FINER:
-        beside = step * np.arange(-2, 3)
-        tried = velocity + np.stack(np.meshgrid(beside, beside), axis=-1).reshape(-1, 2)
+        tried = velocity + step * grid(np.arange(-2, 3))
         velocity = tried[pairs.carried(chosen, tried).mean(axis=1).argmin()]
     return velocity

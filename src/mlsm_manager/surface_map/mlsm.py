@@ -9,6 +9,7 @@ from mlsm_manager.surface_map.block_store import BlockStore, RunningCopy
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, TOP, Blocks, cells_of
 from mlsm_manager.surface_map.cells import TILE_BITS, ChangedTiles, cell_keys, cells_of_keys
 from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
+from node_support.geometry import grid
 
 _EXTENT = [0, 1, BOTTOM, TOP]  # columns of a block that tell where it lies
 
@@ -59,8 +60,7 @@ class MultiLevelSurfaceMap:
 
     def in_tiles(self, tiles: np.ndarray) -> Blocks:
         """Return a copy of the blocks of tiles (n, 2), none twice, as `take_changed_tiles` names them."""
-        side = np.arange(1 << TILE_BITS)
-        within = np.stack(np.meshgrid(side, side, indexing="ij"), axis=-1).reshape(1, -1, 2)
+        within = grid(np.arange(1 << TILE_BITS))
         cells = (np.asarray(tiles, dtype=np.int64).reshape(-1, 1, 2) << TILE_BITS) + within
         rows, _ = self._store.find(cell_keys(cells.reshape(-1, 2)))
         return self._store.blocks(rows, self.resolution)
@@ -82,7 +82,7 @@ class MultiLevelSurfaceMap:
 
     def is_near(self, points: np.ndarray) -> np.ndarray:
         """Return which points (n, >= 2) lie in a cell that holds a block or adjoins one that does."""
-        around = np.stack(np.meshgrid([-1, 0, 1], [-1, 0, 1], indexing="ij"), axis=-1).reshape(-1, 2)
+        around = grid(np.array([-1, 0, 1]))
         cells = cells_of(points, self.resolution)[:, np.newaxis] + around
         _, owners = self._store.find(cell_keys(cells.reshape(-1, 2)))
         near = np.zeros(len(points), dtype=bool)

@@ -10,9 +10,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from georeferencing.adjustment import Adjusted
-from georeferencing.asked import AskedOrigin
+from georeferencing.asked import AskedOrigin, declination_deg
 from georeferencing.chart_files import ChartedPath, geojson, kml
-from georeferencing.declination import declination_deg
 from georeferencing.origin import Origin
 from node_support.errors import RefusedInput
 from node_support.marks import Mark
