@@ -125,7 +125,7 @@ ROWS = (
     FaultRow("compass sticks", rare.compass_sticks, "compass stuck", begins=True),
     FaultRow("compass trembles by {} deg", rare.compass_noisy, "compass trembles", "degrees", 5.0),
     FaultRow("compass {} deg off, positions right", rare.compass_off, _TURNED, "degrees", 60.0),
-    FaultRow("mount tilted {} deg", rare.mount_tilted, "", "degrees", 20.0),
+    FaultRow("mount tilted {} deg", rare.mount_tilted, "is tilted", "degrees", 20.0),
     FaultRow("head loses {} deg each minute", rare.head_loses_steps, f"{_SLIPPED}|{_DRIFTS}", "degrees", 3.0),
     FaultRow("head's angles tremble by {} deg", rare.head_trembles, "", "degrees", 6.0),
     FaultRow("stamps tremble by {} s", rare.stamps_jitter, "", "seconds", 0.5),

@@ -128,6 +128,11 @@ def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
 
 
+def likelihood_of(run: Solution) -> float:
+    """Return the log likelihood of a whole run at its state, as that of a fit."""
+    return _Batch(run).log_likelihood()
+
+
 def fit_path(live: LiveSolver, start: State) -> State:
     """Return the unknowns of the fit that begins at `start` and keeps its steps, without covariances.
 

@@ -44,21 +44,21 @@ def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     return OdometryErrors(run.log.node_times.copy(), reported[:, YAW], nodes[:, YAW], scales, places)
 
 
-def fit_with(run: Solution, track: Track, reckoned: Optional[Tuple[float, float]] = None) -> BatchResult:
+def fit_with(run: Solution, track: Track, stretch: Optional[Tuple[float, float]] = None) -> BatchResult:
     """Return the fit of a run, from where it is, if its odometry had reported `track`.
 
-    reckoned: s, begin and end of a stretch whose path the fit begins with as `track` says; None where there is none.
+    stretch: s, begin and end of one whose path the fit begins with as `track` says; None where there is none.
     """
     log = run.log.since(0, OdometryLog.of(track))
     nodes = run.state.nodes.copy()
     numbers = np.arange(len(nodes))
     nodes[:, : YAW + 1] += run.log.node_poses(numbers) - log.node_poses(numbers)
-    if reckoned is not None:
-        nodes = _reckoned(run, log, nodes, reckoned)
+    if stretch is not None:
+        nodes = reckoned(run, log, nodes, stretch)
     return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
 
 
-def _reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float, float]) -> np.ndarray:
+def reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float, float]) -> np.ndarray:
     """Return the nodes with those of a stretch where `log` leads, and the later ones moved along."""
     result = nodes.copy()
     first, last = np.searchsorted(log.node_times, stretch)

@@ -1,7 +1,7 @@
 """What was measured during a run: surface points of every scan, the nodes' times, the odometry; and its storing."""
 
 from dataclasses import fields, is_dataclass
-from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -39,11 +39,13 @@ class PointTable:
         self._table.extend(**vars(points), scans=np.full(len(points.times), self.scan_count))
         self._starts.append(self._starts[-1] + len(points))
 
-    def since(self, scan: int) -> "PointTable":
-        """Return a table of `scan` and all later ones, the first of which is number 0 there."""
+    def since(
+        self, scan: int, change: Callable[[SurfacePoints], SurfacePoints] = lambda points: points
+    ) -> "PointTable":  # fmt: skip
+        """Return a table of what `change` makes of `scan` and all later ones, the first of which is number 0 there."""
         later = PointTable()
         for number in range(scan, self.scan_count):
-            later.append(self.points(self.rows(number, number + 1))[0])
+            later.append(change(self.points(self.rows(number, number + 1))[0]))
         return later
 
     def shorten(self, scans: int) -> None:
@@ -179,6 +181,13 @@ class RunLog:
         later._forgotten.extend(self.forgotten[scan:])
         later._points_and_echoes.extend(self._points_and_echoes.values[scan:])
         return later
+
+    def heard_as(self, change: Callable[[SurfacePoints], SurfacePoints], sonar_in_base: np.ndarray) -> "RunLog":
+        """Return a log of all scans whose points are what `change` makes of them, heard at `sonar_in_base` (2,) [m]."""
+        other = self.since(0)
+        other.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
+        other.surfaces, other.posts = self.surfaces.since(0, change), self.posts.since(0, change)
+        return other
 
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""

@@ -81,21 +81,20 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
     of_echoes = [*mounted, *echo_findings(scans, recording.sonar_in_base, replayed.corrections).causes]
+    of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
     refined, refitted = None, []
     if options.refine:
         with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
             settings = parameters.map_settings()
-            suspected = [cause.fault for cause in of_echoes if cause.fault is not None]
+            suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
             refined = refine(replayed, recording.track, settings, suspected, bar.update)
     if options.check:
         with _bar(REFITS, "fit", "check") as bar:
             refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    if refined is not None:
-        of_echoes = refined.motion.told_with(of_echoes)
-    of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
-    causes = ranked([*causes, *companions, *of_echoes, *of_beams])
+    of_run = [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
+    causes = ranked([*causes, *companions, *of_run])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))

@@ -1,4 +1,4 @@
-"""What the echoes of a whole run say against its odometry, and the run with that mended."""
+"""What the echoes of a whole run say against its odometry and its sonar, and the run with that mended."""
 
 from dataclasses import dataclass, field, replace
 from typing import List, NamedTuple, Sequence
@@ -9,9 +9,10 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
+from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, fit_without, likeliest
+from mlsm_manager.odometry.faults import FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.causes import Cause, Fault
 from mlsm_manager.self_check.course import course_causes, course_of
 from node_support.geometry import composed, inverse, rotated, transformed
 
@@ -20,6 +21,10 @@ from node_support.geometry import composed, inverse, rotated, transformed
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 _NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
+_BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
+_SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
+_ROUNDS = 2
+_EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
 _FAULTS = 3  # at most, one after the other
 _FEWEST = 15  # nodes: fewer do not tell a change from noise
 
@@ -28,8 +33,9 @@ _FEWEST = 15  # nodes: fewer do not tell a change from noise
 class MotionFindings:
     """The run as it is known once its odometry is doubted.
 
-    run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one.
-    apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its nodes.
+    run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
+    with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
+    nodes.
     """
 
     run: Solution
@@ -53,17 +59,22 @@ class MotionFindings:
         aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
         return replace(self, causes=[*self.causes, *course_causes(course)], apart=[*self.apart, aside])
 
-    def told_with(self, of_echoes: Sequence[Cause]) -> List[Cause]:
-        """Return the causes with those that pairs of scans show: those that the fit mends it tells better.
+    def told_with(self, of_echoes: Sequence[Cause], of_beams: Sequence[Cause]) -> List[Cause]:
+        """Return the causes with those that pairs of scans and beams show: those that the fit mends it tells better.
 
         A wrong mount or wrong stamps explain what the fit finds wrong with the odometry.
         """
         if any(cause.fault is None for cause in of_echoes):
-            return list(of_echoes)
-        return self.causes if self.causes else list(of_echoes)
+            return [*of_echoes, *of_beams]
+        kinds = [cause.fault.kind for cause in self.causes if cause.fault is not None]
+        unexplained = [cause for cause in of_beams if cause.fault is None or cause.fault.kind not in kinds]
+        return [*(self.causes or of_echoes), *unexplained]
 
-    def placed(self, scan: Scan, reported: Track) -> Scan:
-        """Return a scan that was placed by `reported` as this odometry places it."""
+    def placed(self, scan: Scan, reported: Track, sonar_in_base: np.ndarray) -> Scan:
+        """Return a scan that was placed by `reported` and `sonar_in_base` (2,) [m] as this run places it."""
+        for fault in (cause.fault for cause in self.causes):
+            if isinstance(fault, SonarFault):
+                scan, sonar_in_base = fault.placed(scan, sonar_in_base), fault.sonar_in_base(sonar_in_base)
         if self.track is reported:
             return scan
         moves = composed(self.track.at(scan.times), inverse(reported.at(scan.times)))
@@ -71,19 +82,20 @@ class MotionFindings:
 
 
 class _Trial(NamedTuple):
-    fault: MotionFault
-    track: Track
+    fault: Fault
+    run: Solution
     fit: BatchResult
+    track: Track
 
 
 def motion_findings(
-    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[MotionFault] = ()
+    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[Fault] = ()
 ) -> MotionFindings:  # fmt: skip
-    """Return what speaks against the odometry `track` of a run that is fitted as `fit` says, and the run without it.
+    """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
 
-    Each fault is taken out of the odometry and the run fitted again; the one with which echoes agree best is named.
-    What a fit finds besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of
-    scans show.
+    Each fault is taken out and the run fitted again; the one with which echoes agree best is named. What a fit finds
+    besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of scans and beams
+    show.
     """
     found = MotionFindings(run, fit, track)
     if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST:
@@ -94,9 +106,10 @@ def motion_findings(
         if errors is None:
             return found
         places = errors.places
-        if len(found.causes) == _FAULTS or not (_errs(errors) or suspected):
+        faults = [*_likely(errors), *suspected, *_of_sonar(found)]
+        if len(found.causes) == _FAULTS or not faults:
             break
-        best = _best(found, [*_likely(errors), *suspected])
+        best = _best(found, faults)
         gain = best.fit.log_likelihood - found.fit.log_likelihood
         if gain < _NATS or not best.fault.is_beyond(errors.times[-1]):
             break
@@ -115,19 +128,45 @@ def _errs(errors: OdometryErrors) -> bool:
     return bool(errors.headings.std() > _HEADING or scales.std() > _SCALE or abs(scales.mean()) > _LENGTH)
 
 
-def _likely(errors: OdometryErrors) -> List[MotionFault]:
-    return likely_faults(errors.times, errors.yaws, errors.headings, errors.scales) if _errs(errors) else []
+def _likely(errors: OdometryErrors) -> List[Fault]:
+    """Return faults that explain what a fit corrects which lets the odometry err; ranges may have changed instead."""
+    if not _errs(errors):
+        return []
+    found = likely_faults(errors.times, errors.yaws, errors.headings, errors.scales)
+    changed = next(one for one in found if one.kind is FaultKind.DISTANCES)
+    number = int(np.searchsorted(errors.times, changed.begin))
+    begins = errors.times[max(number - _EARLIER, 1) : number + _LATER]
+    return [*found, *(SonarFault(SonarKind.RANGES, begin, changed.times(-1.0).sizes) for begin in begins.tolist())]
 
 
-def _best(found: MotionFindings, faults: Sequence[MotionFault]) -> _Trial:
+def _of_sonar(found: MotionFindings) -> List[SonarFault]:
+    """Return faults of the sonar that make the run likelier, and are more than mounts usually err."""
+    return [fault for fault in likeliest(found.run, found.fit) if fault.is_beyond(found.fit.node_times[-1])]
+
+
+def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:
     best = max((_tried(found, fault) for fault in faults), key=_likelihood)
-    return max([best, *(_tried(found, best.fault.times(factor)) for factor in _LARGER)], key=_likelihood)
+    for _ in range(_ROUNDS if isinstance(best.fault, SonarFault) else 1):
+        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_likelihood)
+    return best
 
 
-def _tried(found: MotionFindings, fault: MotionFault) -> _Trial:
+def _beside(fault: Fault) -> List[Fault]:
+    if not isinstance(fault, SonarFault):
+        return [fault.times(factor) for factor in _LARGER]
+    others = [fault.times(factor) for factor in _BESIDE]
+    if fault.kind is SonarKind.RANGES:
+        others += [replace(fault, begin=fault.begin + seconds) for seconds in _SECONDS]
+    return others
+
+
+def _tried(found: MotionFindings, fault: Fault) -> _Trial:
+    if isinstance(fault, SonarFault):
+        return _Trial(fault, *fit_without(found.run, fault), found.track)
     track = fault.mended(found.track)
     span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
-    return _Trial(fault, track, fit_with(found.run, track, span))
+    run = replace(found.run, log=found.run.log.since(0, OdometryLog.of(track)))
+    return _Trial(fault, run, fit_with(found.run, track, span), track)
 
 
 def _likelihood(trial: _Trial) -> float:
@@ -135,7 +174,6 @@ def _likelihood(trial: _Trial) -> float:
 
 
 def _without(found: MotionFindings, trial: _Trial, gain: float) -> MotionFindings:
-    log = found.run.log.since(0, OdometryLog.of(trial.track))
-    run = replace(found.run, log=log, state=trial.fit.state)
+    run = replace(trial.run, state=trial.fit.state)
     cause = Cause(trial.fault.text, gain, trial.fault.begin, fault=trial.fault)
     return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

@@ -14,10 +14,10 @@ from mlsm_manager.joint_solver.solution import Solution, solved_path
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
-from mlsm_manager.odometry.faults import MotionFault
 from mlsm_manager.offline.motion_findings import MotionFindings, motion_findings
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import Fault
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
@@ -60,13 +60,13 @@ def parts_of_refining(hypotheses: Hypotheses) -> int:
 
 
 def refine(
-    replayed: Replayed, track: Track, settings: MapSettings, suspected: Sequence[MotionFault] = (),
+    replayed: Replayed, track: Track, settings: MapSettings, suspected: Sequence[Fault] = (),
     done: Done = lambda: None,
 ) -> Refined:  # fmt: skip
     """Return the run of all scans that the solvers have taken, fitted at once; live runs are where fits begin.
 
-    Of several odometries the likelier one is believed from then on. suspected: what pairs of scans say is wrong with
-    the odometry `track`.
+    Of several odometries the likelier one is believed from then on. suspected: what pairs of scans and beams say is
+    wrong with sonar or odometry, which said `track`.
     """
     hypotheses = replayed.hypotheses
     fits = []
@@ -80,7 +80,7 @@ def refine(
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in replayed.scans:
-        surfaces.add(MapCloud.of_scan(motion.placed(scan, track)))
+        surfaces.add(MapCloud.of_scan(motion.placed(scan, track, replayed.solver.log.sonar_in_base)))
     surfaces.settle(motion.run)
     whole, batch = OdometryLog.of(motion.track), motion.fit
     poses = solved_path(whole, solver.odometry, batch.node_times, batch.state.nodes, track.times)

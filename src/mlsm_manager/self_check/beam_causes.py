@@ -4,6 +4,7 @@ from typing import Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.self_check.causes import Cause
 from node_support.timing import stretches
 from sonar_processing.beams.beam import PlacedBeam
@@ -36,9 +37,8 @@ def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
         return stands
     hears = np.array([bool(one.beam.intensities.any()) for one in beams])
     found = [_stuck(times, beams), _blind(angles, hears), _doubled(beams)]
-    for text, measure in _MEASURES:
-        values = np.array([measure(one) for one, heard in zip(beams, hears) if heard])
-        found.append(_changed(times[hears], values, text))
+    heard = [one for one, hears_any in zip(beams, hears) if hears_any]
+    found += [_changed(times[hears], heard, measure, text) for text, measure in _MEASURES]
     return [cause for cause in found if cause is not None]
 
 
@@ -136,8 +136,14 @@ _MEASURES: Tuple[Tuple[str, Callable[[PlacedBeam], float]], ...] = (
 """What a change of it means, and what is measured of a beam."""
 
 
-def _changed(times: np.ndarray, values: np.ndarray, text: str) -> Optional[Cause]:
-    """Return when the median of `values` (n,) stepped, where both sides of it are steady."""
+def _changed(
+    times: np.ndarray, beams: Sequence[PlacedBeam], measure: Callable[[PlacedBeam], float], text: str
+) -> Optional[Cause]:
+    """Return when the median of what is measured of beams (n) at `times` (n,) stepped, where both sides are steady.
+
+    Echoes that are longer than they were may be as long as ever, in reported ranges that are longer than the true ones.
+    """
+    values = np.array([measure(one) for one in beams])
     if len(times) < _FEWEST:
         return None
     best = (1.0, np.nan, np.nan)
@@ -154,4 +160,6 @@ def _changed(times: np.ndarray, values: np.ndarray, text: str) -> Optional[Cause
             best = (factor, moment, after / before)
     if np.isnan(best[1]):
         return None
-    return Cause(text.format(ratio=best[2]), _CERTAIN / 10.0, float(best[1]), metres=1.0)
+    begin = float(best[1])
+    fault = SonarFault(SonarKind.RANGES, begin, (-float(np.log(best[2])),)) if measure is _length else None
+    return Cause(text.format(ratio=best[2]), _CERTAIN / 10.0, begin, metres=1.0, fault=fault)

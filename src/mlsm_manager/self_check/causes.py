@@ -1,10 +1,11 @@
 """What is wrong with a run, when and by how much; the evidence ranks several."""
 
 from dataclasses import dataclass
-from typing import Any, Dict, Iterable, List, Optional, Sequence
+from typing import Any, Dict, Iterable, List, Optional, Sequence, Union
 
 import numpy as np
 
+from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.odometry.faults import MotionFault
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
@@ -14,6 +15,8 @@ _FEW = 3  # steps that are told one by one
 _SPEED_CHANGE, _TURN_RATE = 0.15, 0.05  # m/s, rad/s: by which a small vehicle changes its motion while it works
 _LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, besides what it did just before
 
+Fault = Union[MotionFault, SonarFault]
+
 
 @dataclass(frozen=True)
 class Cause:
@@ -22,7 +25,7 @@ class Cause:
     text: what and how much, one clause. evidence: nats over "nothing is wrong". begin: s, when it began; NaN where it
     holds for the whole run. is_mended: whether the run went on without it.
     turn: rad, length: relative, metres: by how much the path from `begin` on may be turned, too long, and shifted.
-    fault: of the odometry, which a fit may mend; None where it is none.
+    fault: which a fit may mend; None where none can.
     """
 
     text: str
@@ -32,7 +35,7 @@ class Cause:
     turn: float = 0.0
     length: float = 0.0
     metres: float = 0.0
-    fault: Optional[MotionFault] = None
+    fault: Optional[Fault] = None
 
     def to_mapping(self, run_begin: float) -> Dict[str, Any]:
         """Return it for summary.json; run_begin: s."""

@@ -4,6 +4,7 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
@@ -94,8 +95,8 @@ def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     size, nats = float(np.hypot(found.ahead, found.aside)), pairs.evidence(found, honest) - np.log(2 * len(steps))
     if size < _ARM_TOLD or nats < _NATS:
         return []
-    text = f"the sonar sits {found.ahead:+.1f} m ahead and {found.aside:+.1f} m to the left of where tf says"
-    return [Cause(text, nats, metres=size)]
+    fault = SonarFault(SonarKind.ARM, np.nan, (found.ahead, found.aside))
+    return [Cause(fault.text, nats, metres=size, fault=fault)]
 
 
 def _changed(pairs: ScanPairs) -> List[Cause]:
@@ -122,5 +123,5 @@ def _of_change(change: Change, begin: float, nats: float, usual: float) -> Cause
     if change.ranges == 1.0:
         fault = MotionFault(FaultKind.SLIP, begin, (change.turn,))
         return Cause(fault.text, nats, begin, turn=abs(change.turn), fault=fault)
-    text = f"the range setting changed untold: reported ranges are {1.0 / change.ranges:.2f} times the true ones"
-    return Cause(text, nats, begin, metres=abs(1.0 - change.ranges) * usual)
+    fault = SonarFault(SonarKind.RANGES, begin, (float(np.log(change.ranges)),))
+    return Cause(fault.text, nats, begin, metres=abs(1.0 - change.ranges) * usual, fault=fault)

@@ -1,0 +1,68 @@
+"""Faults of the sonar, all along or from a moment on, are found by fitting the run without them, and taken out."""
+
+import numpy as np
+import pytest
+from benchmarks import fault_makers as broken
+from benchmarks.rare_faults import mount_tilted
+from made_recordings import SECONDS, touring
+
+from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
+from mlsm_manager.offline.bag_mapping import mapped_bag
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.scan_matching.scan import Scan, Track
+
+WHOLE, MIDDLE = touring(), SECONDS / 2.0
+ARM = SonarFault(SonarKind.ARM, np.nan, (2.0, 1.0))
+TILT = SonarFault(SonarKind.TILT, np.nan, (0.1, 0.0))
+RANGES = SonarFault(SonarKind.RANGES, 1.5, (np.log(2.0),))
+SONAR_IN_BASE = np.array([1.0, 0.0])
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (ARM, "the sonar sits +2.0 m ahead and +1.0 m to the left of where tf says"),
+        (TILT, "the sonar's plane is tilted by about 35 deg against tf"),
+        (RANGES, "the range setting changed untold: reported ranges are 0.50 times the true ones"),
+    ],
+)
+def test_a_fault_is_told_as_what_the_sonar_did(fault, said):
+    assert fault.text == said
+
+
+@pytest.mark.parametrize(
+    ("fault", "places"),
+    [
+        (ARM, [[3.0, 6.0], [5.0, 3.0]]),  # 2 m ahead is along y of odom, 1 m to the left against x
+        (TILT, [[4.0, 4.3], [5.8, 1.0]]),
+        (RANGES, [[4.0, 4.0], [8.0, 1.0]]),  # the first is from before the change
+    ],
+)
+def test_points_lie_where_they_would_without_the_fault(fault, places):
+    """The vehicle looks along y of odom at (4, 0) m; its sonar is at (4, 1) m."""
+    track = Track(np.array([0.0, 3.0]), np.tile([4.0, 0.0, np.pi / 2.0], (2, 1)))
+    points = np.array([[4.0, 4.0, 0.0, 1.0], [6.0, 1.0, 0.0, 1.0]])
+    moved = fault.placed(Scan(points, np.array([1.0, 2.0]), np.zeros(2, dtype=bool), track, 2.0), SONAR_IN_BASE)
+    np.testing.assert_allclose(moved.points[:, :2], places, atol=1e-9)
+
+
+def mapped(recording):
+    return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", "--refine"]))
+
+
+@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
+@pytest.mark.parametrize(
+    ("recording", "said", "most"),
+    [
+        (broken.mount_shifted(WHOLE, 2.0), "the sonar sits +", 0.5),
+        (mount_tilted(WHOLE, 25.0), "the sonar's plane is tilted by about 2", 0.5),
+        (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", 0.5),
+    ],
+    ids=["arm", "tilt", "ranges"],
+)
+def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, most):
+    found = mapped(recording)
+    assert found.findings.trust.causes[0].text.startswith(said)
+    assert found.findings.trust.line.startswith("trust: DOUBTFUL")
+    apart = np.hypot(*(found.run.best - WHOLE.track.at(found.run.times))[:, :2].T)
+    assert apart.mean() < most  # m
