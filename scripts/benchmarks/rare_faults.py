@@ -14,9 +14,18 @@ _FULL = 255
 
 def odometry_stalls(recording: Recording, seconds: float, every: float = 60.0) -> Recording:
     """Let the pose stay for some seconds each minute; then it goes on from there."""
+    return _without_steps(recording, seconds, every, np.ones(3))
+
+
+def velocities_missing(recording: Recording, seconds: float, every: float = 60.0) -> Recording:
+    """Let positions stay for some seconds each minute, as where a DVL tells nothing, while the compass goes on."""
+    return _without_steps(recording, seconds, every, np.array([1.0, 1.0, 0.0]))
+
+
+def _without_steps(recording: Recording, seconds: float, every: float, columns: np.ndarray) -> Recording:
     since = recording.track.times - recording.track.times[0]
     steps = steps_of(recording.track.poses)
-    steps[(since[1:] % every) < seconds] = 0.0
+    steps[(since[1:] % every) < seconds] *= 1.0 - columns
     return with_odometry(recording, integrated(recording.track.poses[0], steps))
 
 

@@ -86,8 +86,8 @@ class GrowingTable:
 class Motion:
     """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
 
-    held: (m,) s, for how long until then positions did not change at all while the heading did: the odometry told
-    nothing, or the vehicle was at rest. positions: (m,) complex x + i y [m] in odom.
+    held: (m,) s, for how long until then positions did not change at all while the heading did, or were lost: the
+    odometry told nothing, or the vehicle was at rest. positions: (m,) complex x + i y [m] in odom.
 
     "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
     """
@@ -155,7 +155,7 @@ class OdometryLog:
         if len(self):
             jump = poses[0, 2] - self._table["poses"][-1, 2]
             poses[:, 2] -= 2.0 * np.pi * np.round(jump / (2.0 * np.pi))
-        ahead, held = self._gone_ahead(times, poses[:, 2]), self._seconds_held(times, poses)
+        ahead, held = self._gone_ahead(times, poses[:, 2]), self._seconds_held(times, poses, track.lost[first:last])
         self._table.extend(times=times, poses=poses, ahead=ahead, held=held)
 
     def _gone_ahead(self, times: np.ndarray, yaw: np.ndarray) -> np.ndarray:
@@ -168,8 +168,8 @@ class OdometryLog:
         steps = (heading[1:] + heading[:-1]) / 2.0 * np.diff(times)[:, np.newaxis]
         return start + np.cumsum(steps, axis=0)
 
-    def _seconds_held(self, times: np.ndarray, poses: np.ndarray) -> np.ndarray:
-        """Return for how long (m,) [s] positions were held until each of the newest poses (m, 3); see Motion."""
+    def _seconds_held(self, times: np.ndarray, poses: np.ndarray, lost: np.ndarray) -> np.ndarray:
+        """Return for how long (m,) [s] positions were held until each of the newest poses (m, 3); see Motion, Track."""
         near = slice(max(int(np.searchsorted(self._table["times"], times[0] - _HOLD)) - 1, 0), None)
         known = self._table["times"][near]
         all_times, all_poses = np.append(known, times), np.concatenate([self._table["poses"][near], poses])
@@ -177,7 +177,7 @@ class OdometryLog:
         moves = poses - all_poses[np.maximum(before, 0)]
         is_held = (before >= 0) & (moves[:, :2] == 0.0).all(axis=1) & (moves[:, 2] != 0.0)
         steps = np.diff(all_times, prepend=all_times[0])[len(known) :]
-        return self._table["held"][-1:].sum() + np.cumsum(np.where(is_held, steps, 0.0))
+        return self._table["held"][-1:].sum() + np.cumsum(np.where(is_held, steps, np.minimum(lost, steps)))
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""

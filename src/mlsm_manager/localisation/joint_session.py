@@ -238,7 +238,7 @@ def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:
 def _moved_track(track: Track, T_map_odom: np.ndarray) -> Track:
     if not T_map_odom.any():
         return track
-    return Track(track.times, composed(T_map_odom, track.poses))
+    return track.with_poses(composed(T_map_odom, track.poses))
 
 
 def belief_of(estimate: LiveEstimate, errors: OdometryErrors, fading: Optional[Fading]) -> Belief:

@@ -78,17 +78,17 @@ class MotionFault:
         """
         if self.kind is FaultKind.CARRIED:
             since = np.clip(track.times - self.begin, 0.0, self.end - self.begin)
-            return Track(track.times, track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
+            return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
         steps = composed(inverse(track.poses[:-1]), track.poses[1:])
         errors = _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
         if self.kind in _OF_DISTANCES:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])
-            return Track(track.times, integrated(track.poses[0], steps))
+            return track.with_poses(integrated(track.poses[0], steps))
         yaws = track.poses[:, 2] + errors
         if self.kind is FaultKind.SLIP:
-            return Track(track.times, np.column_stack([track.poses[:, :2], yaws]))
+            return track.with_poses(np.column_stack([track.poses[:, :2], yaws]))
         steps[:, 2] = np.diff(yaws)
-        return Track(track.times, integrated(np.append(track.poses[0, :2], yaws[0]), steps))
+        return track.with_poses(integrated(np.append(track.poses[0, :2], yaws[0]), steps))
 
 
 def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:

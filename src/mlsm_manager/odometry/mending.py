@@ -79,7 +79,7 @@ def _with_holds_bridged(track: Track, limits: MotionLimits) -> Tuple[Track, List
             if np.hypot(*(track.poses[last + 1] - track.poses[last])[:2]) <= limits.max_speed * seconds:
                 kept[first + 1 : last + 1] = False
                 held.append((float(track.times[first]), float(track.times[last])))
-    return Track(track.times[kept], track.poses[kept]), held
+    return track.chosen(kept), held
 
 
 def _with_headings_mended(track: Track, limits: MotionLimits) -> Tuple[Track, List[Step]]:
@@ -93,7 +93,7 @@ def _with_headings_mended(track: Track, limits: MotionLimits) -> Tuple[Track, Li
         if wrapped(before - after) * np.sign(turn) > _FOLLOWS * abs(turn) and np.hypot(*move[:2]) < LEAST_STEP[0]:
             poses = track.poses.copy()
             poses[number:, 2] -= turn
-            track = Track(track.times, poses)
+            track = track.with_poses(poses)
             steps.append(Step(StepKind.COMPASS, time, float(np.hypot(*move[:2])), turn))
     return track, steps
 

@@ -1,12 +1,13 @@
 """Odometry as a sequence of steps: those that no vehicle can make are found, and replaced by going on as before."""
 
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.odometry.faults import integrated
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse, wrapped
 from node_support.parameters import ParameterSet, parameter
@@ -18,7 +19,7 @@ _OUTSTANDING = 8.0  # times the usual step around
 _AROUND = 10  # poses before and after that tell what is usual
 _NEXT = 0.3  # s: between two poses of a slow odometry that goes on
 _AT_ZERO = 0.5  # m: where an odometry is that began again
-_STALLS = (1.0, 10.0)  # s of equal poses: longer than between two poses; longer ones may be a vehicle that stands
+_SHORTEST_STALL = 1.0  # s of equal positions: longer than between two poses
 _BEFORE = 1.0  # s before a stall that tell how the vehicle went
 _GOES = np.array([0.05, np.radians(2.0)])  # m/s, rad/s: by less it may be stopping
 _TO_AND_FRO = 3  # changes of direction in that second
@@ -47,6 +48,13 @@ class StepKind(Enum):
     COMPASS = "compass stepped by {turn:.0f} deg"
     TREMBLES = "the compass trembles by about {turn:.0f} deg"
     STALLED = "odometry stalled, and missed {size:.1f} m and {turn:.0f} deg"
+    POSITIONS = "positions stood while the heading went on, and missed {size:.1f} m"
+
+
+_LONGEST_STALLS = {StepKind.STALLED: 10.0, StepKind.POSITIONS: 30.0}
+"""s of equal poses, of which longer ones may be a vehicle that stands; and of equal positions beside a heading that is
+measured, while which a vehicle may go on as before.
+"""
 
 
 @dataclass(frozen=True)
@@ -119,9 +127,9 @@ class ContinuousOdometry:
                     self._bridge(track, stalled[number])
                 else:
                     self._leave_out(track, number)
-        oldest = int(np.searchsorted(track.times, track.times[-1] - sum(_STALLS) - _BEFORE))
+        oldest = int(np.searchsorted(track.times, track.times[-1] - max(_LONGEST_STALLS.values()) - _BEFORE))
         newest = slice(min(oldest, max(len(track.times) - _AROUND, 0)), None)
-        self._newest = Track(track.times[newest], track.poses[newest])
+        self._newest = track.chosen(newest)
         self._known = True
 
     def _stood_until(self, before: float, after: float) -> bool:
@@ -138,7 +146,7 @@ class ContinuousOdometry:
             missed[2] = step[2]
         self._expected = composed(composed(self._fixes[-1], before), missed)
         times, jumped = track.times[[stall.begin, stall.end]], not np.array_equal(missed[:2], stall.missed[:2])
-        self._put(StepKind.STALLED, times, missed, after, 0.0 if jumped else float(times[1] - times[0]))
+        self._put(stall.kind, times, missed, after, 0.0 if jumped else float(times[1] - times[0]))
 
     def _leave_out(self, track: Track, number: int) -> None:
         """Let the odometry go on without the step to pose `number`."""
@@ -183,44 +191,61 @@ class ContinuousOdometry:
         """Return T_continuous_base of a track that was taken, without what was interpolated within a step."""
         if not self.steps:
             return track
-        within = np.zeros(len(track.times), dtype=bool)
+        within, lost = np.zeros(len(track.times), dtype=bool), track.lost.copy()
         for begin, step in zip(self._begins, self.steps):
             within |= (track.times > begin) & (track.times < step.time)
-        times, poses = track.times[~within], track.poses[~within]
-        return Track(times, composed(self.fixes(times), poses)) if len(times) else track
+            lost[track.times == step.time] += step.lost
+        if within.all():
+            return track
+        mended = replace(track, poses=composed(self.fixes(track.times), track.poses), lost=lost)
+        return mended.chosen(~within)
 
 
 class Stall(NamedTuple):
     """begin, end: of the poses, the first that stood and the first after it. missed, usual: (3,) in base_link, how the
-    vehicle went meanwhile, and in a step as long as the last one, if it went on as before.
+    vehicle went meanwhile, and in a step as long as the last one, if it went on as before. kind: STALLED where the
+    heading stood too, else POSITIONS.
     """
 
     begin: int
     end: int
     missed: np.ndarray
     usual: np.ndarray
+    kind: StepKind
 
 
 def stalls(track: Track) -> List[Stall]:
-    """Return where the pose stood for seconds, though no vehicle stops and starts so suddenly."""
-    same = stretches((np.diff(track.poses, axis=0) == 0.0).all(axis=1))
+    """Return where the position stood for seconds, though no vehicle stops and starts so suddenly."""
+    same = stretches((np.diff(track.poses[:, :2], axis=0) == 0.0).all(axis=1))
     found = (_stall(track, first, last) for first, last in same if last + 1 < len(track.times))
     return [stall for stall in found if stall is not None]
 
 
 def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
-    times, poses = track.times, track.poses
-    seconds, start = times[last] - times[first], int(np.searchsorted(times, times[first] - _BEFORE))
-    if not _STALLS[0] <= seconds < _STALLS[1] or first - start < 2:
+    times, poses, start = track.times, track.poses, int(np.searchsorted(track.times, track.times[first] - _BEFORE))
+    kind = StepKind.POSITIONS if np.ptp(poses[first : last + 1, 2]) else StepKind.STALLED
+    if not _SHORTEST_STALL <= times[last] - times[first] < _LONGEST_STALLS[kind] or first - start < 2:
         return None
-    steps = composed(inverse(poses[start:first]), poses[start + 1 : first + 1])
+    steps, step = composed(inverse(poses[start:first]), poses[start + 1 : first + 1]), times[last + 1] - times[last]
     rates = steps / np.diff(times[start : first + 1])[:, np.newaxis]
-    usual, step = np.median(rates, axis=0), composed(inverse(poses[last]), poses[last + 1])
-    speeds, sudden, again = (_speeds(one) for one in (usual, rates[-1], step / (times[last + 1] - times[last])))
-    goes = (speeds > _GOES) & (sudden > _AS_BEFORE * speeds) & (again > _AS_BEFORE * speeds)
-    if not goes.any() and not _trembles(steps[:, 2]):
-        return None
-    return Stall(first, last + 1, usual * (times[last + 1] - times[first]), usual * (times[last + 1] - times[last]))
+    usual, again = np.median(rates, axis=0), composed(inverse(poses[last]), poses[last + 1]) / step
+    stops = (_speeds(usual) > _GOES) & (_speeds(rates[-1]) > _AS_BEFORE * _speeds(usual))
+    if kind is StepKind.POSITIONS:
+        missed = _steered(usual * stops[0], again, times[first : last + 2], poses[first : last + 2, 2])
+        goes = stops[0] or _speeds(again)[0] > _GOES[0]
+    else:
+        missed = usual * (times[last + 1] - times[first])
+        goes = (stops & (_speeds(again) > _AS_BEFORE * _speeds(usual))).any() or _trembles(steps[:, 2])
+    return Stall(first, last + 1, missed, usual * step, kind) if goes else None
+
+
+def _steered(before: np.ndarray, after: np.ndarray, times: np.ndarray, headings: np.ndarray) -> np.ndarray:
+    """Return the move (3,) of a vehicle with headings (m,) whose velocity in base_link goes over to another (3,)."""
+    durations = np.diff(times)
+    share = (np.cumsum(durations) - durations / 2.0) / durations.sum()
+    steps = durations[:, np.newaxis] * (before + share[:, np.newaxis] * (after - before))
+    steps[:, 2] = np.diff(headings)
+    return integrated(np.zeros(3), steps)[-1]
 
 
 def _trembles(turns: np.ndarray) -> bool:

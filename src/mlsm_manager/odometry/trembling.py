@@ -27,7 +27,7 @@ def with_headings_smoothed(track: Track) -> Tuple[Track, List[Step]]:
     smoothed = _smoothed(track.times, poses[:, _YAW], np.where(trembles, noise, _STEADY))
     poses[trembles, _YAW] = smoothed[trembles]
     begin = float(track.times[np.argmax(trembles)])
-    return Track(track.times, poses), [Step(StepKind.TREMBLES, begin, 0.0, float(np.median(noise[trembles])))]
+    return track.with_poses(poses), [Step(StepKind.TREMBLES, begin, 0.0, float(np.median(noise[trembles])))]
 
 
 def _noise(track: Track) -> np.ndarray:

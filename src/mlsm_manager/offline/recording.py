@@ -157,7 +157,7 @@ def track_between(track: Track, start: float, end: float) -> Track:
     """Return the part of a track that covers the times `start` to `end` [s], as far as it reaches."""
     first = max(int(np.searchsorted(track.times, start, side="right")) - 1, 0)
     last = min(int(np.searchsorted(track.times, end)) + 1, len(track.times))
-    return Track(track.times[first:last], track.poses[first:last])
+    return track.chosen(slice(first, last))
 
 
 def read_recording(path: Path, request: Request) -> Recording:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Protocol
+from typing import Optional, Protocol, Union
 
 import numpy as np
 
@@ -15,11 +15,13 @@ from node_support.geometry import composed, inverse, transformed, wrapped
 class Track:
     """The vehicle's way by odometry. Raises RefusedInput when times are not finite or do not increase.
 
-    times: (m,) s, increasing, m > 0. poses: (m, 3) T_odom_base, x y [m] and yaw [rad].
+    times: (m,) s, increasing, m > 0. poses: (m, 3) T_odom_base, x y [m] and yaw [rad]. lost: (m,) s, of those since the
+    pose before, in which nothing told how far the vehicle went; by default none.
     """
 
     times: np.ndarray
     poses: np.ndarray
+    lost: Optional[np.ndarray] = None
 
     def __post_init__(self) -> None:
         times = np.asarray(self.times, dtype=np.float64)
@@ -31,6 +33,15 @@ class Track:
         poses[:, 2] = np.unwrap(poses[:, 2])
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "poses", poses)
+        object.__setattr__(self, "lost", np.zeros(len(times)) if self.lost is None else self.lost)
+
+    def chosen(self, rows: Union[slice, np.ndarray]) -> "Track":
+        """Return the poses `rows`, a slice or (m,) bool."""
+        return Track(self.times[rows], self.poses[rows], self.lost[rows])
+
+    def with_poses(self, poses: np.ndarray) -> "Track":
+        """Return the track with other poses (m, 3)."""
+        return replace(self, poses=poses)
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_odom_base (..., 3) at `times` (...), between the known poses linearly, beyond them the nearest."""

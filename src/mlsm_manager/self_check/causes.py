@@ -75,8 +75,9 @@ def _of_step(steps: List[Step]) -> Cause:
     most, lost = max(steps, key=lambda step: (step.size, abs(step.turn))), [step.lost for step in steps]
     text = most.text if len(steps) == 1 else f"{most.text} at most, {len(steps)} times, first"
     seconds, is_mended = float(np.linalg.norm(lost)), len(steps) == 1 or not any(lost)
+    turn = 0.0 if most.kind is StepKind.POSITIONS else _TURN_RATE * seconds
     metres = float(np.hypot(_LEFT * np.sqrt(len(steps)), _SPEED_CHANGE * seconds))
-    return Cause(text, CERTAIN + most.size, steps[0].time, is_mended, _TURN_RATE * seconds, metres=metres)
+    return Cause(text, CERTAIN + most.size, steps[0].time, is_mended, turn, metres=metres)
 
 
 def widened(

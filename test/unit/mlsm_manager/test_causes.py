@@ -8,6 +8,7 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring
 
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
@@ -67,6 +68,23 @@ def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
     assert causes[0].begin == pytest.approx(START + MIDDLE + 5.0, abs=0.3)
     apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
     assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+
+
+@pytest.mark.parametrize("seconds", [3.0, 20.0])
+def test_a_vehicle_goes_on_by_its_compass_while_positions_stand(seconds):
+    standing = rare.velocities_missing(WHOLE, seconds, every=MIDDLE)
+    mended, causes = with_odometry_mended(standing, LIMITS)
+    assert causes[0].text.startswith("positions stood while the heading went on, and missed ")
+    assert causes[0].begin == pytest.approx(START + MIDDLE + seconds, abs=0.3)
+    stood = START + MIDDLE + np.array([-0.1, seconds + 0.1])
+    went, mended_way = (np.diff(track.at(stood)[:, :2], axis=0)[0] for track in (WHOLE.track, mended.track))
+    assert np.hypot(*(mended_way - went)) < 0.3 * np.hypot(*went)
+
+
+def test_nobody_knows_how_far_a_vehicle_went_whose_positions_stood():
+    mended, _ = with_odometry_mended(rare.velocities_missing(WHOLE, 5.0, every=MIDDLE), LIMITS)
+    before, after = OdometryLog.of(mended.track).motion(START + MIDDLE + np.array([-1.0, 40.0])).held
+    assert after - before == pytest.approx(5.0, abs=0.3)
 
 
 def test_an_odometry_that_keeps_stalling_leaves_the_run_doubtful():
