@@ -19,7 +19,7 @@ from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
 from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
-from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
+from mlsm_manager.self_check.map_checks import AGREES, in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import odometry_decided, position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, inverse, transformed, wrapped
@@ -30,8 +30,6 @@ _MOST_STORED = 200
 """Scans of a run that are stored with each save: about an hour, and some megabytes."""
 _MOST_SCANS = 30
 """For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
-_AGREES = 0.5
-"""Share of a scan's points on surfaces of others from which on it agrees with them."""
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
 _MOST_APART = 200
@@ -163,7 +161,7 @@ class JointSession:
         if not np.isinf(self.solver.odometry.distance_deviation):
             return False
         first = self.solver.estimates[:_CHECKED_SCANS]
-        return all(estimate is not None and estimate.agreement < _AGREES for estimate in first)
+        return all(estimate is not None and estimate.agreement < AGREES for estimate in first)
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""

@@ -8,7 +8,8 @@ from mlsm_manager.self_check.verdict import Verdict, merged, moment, percent
 
 _WINDOW = 20  # scans in which some may lie beside the others
 _MAY_BE_BESIDE = 0.2  # share of these: a vehicle that comes around a corner hears new water
-_AGREES = 0.5  # share of a scan's points on known surfaces from which on the scan agrees: the larger part
+AGREES = 0.5
+"""Share of a scan's points on known surfaces from which on the scan agrees: the larger part."""
 _GOOD_ODOMETRY = 0.1  # relative deviation of reported distances up to which these tell the way along a canal
 _SCANS = 10  # about 2 minutes, in which a small vehicle passes what it hears
 
@@ -66,7 +67,7 @@ def recent_agreement(times: np.ndarray, agreements: np.ndarray, scans: int = 20,
     name, question = "scans on the map", "Do the newest scans lie on the map that earlier scans made?"
     if len(agreements) < scans:
         return Verdict(name, np.nan, limit, f"fewer than {scans} scans that heard something", True, question=question)
-    total = np.cumsum(np.concatenate([[0.0], np.asarray(agreements) >= _AGREES]))
+    total = np.cumsum(np.concatenate([[0.0], np.asarray(agreements) >= AGREES]))
     share = (total[scans:] - total[:-scans]) / scans
     newest, starts = float(share[-1]), np.asarray(times)[: len(share)][share < limit]
     doubtful = merged(starts, float(np.median(np.diff(times))) * (scans - 1))

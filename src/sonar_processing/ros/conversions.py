@@ -55,18 +55,18 @@ def cloud_from_message(message: StampedIntensityCloud) -> Cloud:
     )
 
 
-def points_from_message(message: PointCloud2, wanted: Sequence[str] = POINT_FIELDS) -> np.ndarray:
-    """Return (n, len(wanted)) float32; raises RefusedInput when fields are missing or the data is too short."""
+def points_from_message(
+    message: PointCloud2, wanted: Sequence[str] = POINT_FIELDS, kind: str = "clouds refused"
+) -> np.ndarray:
+    """Return (n, len(wanted)) float32; raises RefusedInput of a `kind` for missing fields and too little data."""
     offsets = {f.name: f.offset for f in message.fields if f.datatype == PointField.FLOAT32 and f.count <= 1}
     missing = [name for name in wanted if name not in offsets]
     if missing:
-        raise RefusedInput("clouds refused", f"no float32 field {', '.join(missing)}; check the publisher")
+        raise RefusedInput(kind, f"no float32 field {', '.join(missing)}; check the publisher")
     places = [offsets[name] for name in wanted]
     count, step = message.width * message.height, message.point_step
     if message.is_bigendian or step < max(places) + _FLOAT_BYTES or len(message.data) != count * step:
-        raise RefusedInput(
-            "clouds refused", f"{len(message.data)} bytes for {count} points of {step} bytes; check the publisher"
-        )
+        raise RefusedInput(kind, f"{len(message.data)} bytes for {count} points of {step} bytes; check the publisher")
     if count == 0:
         return np.zeros((0, len(wanted)), dtype=np.float32)
     if places == list(range(0, step, _FLOAT_BYTES)):

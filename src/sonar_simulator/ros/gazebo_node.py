@@ -3,7 +3,6 @@
 import math
 from typing import Callable, Dict, Optional
 
-import genpy
 import numpy as np
 import rospy
 from genpy import DeserializationError, Message
@@ -17,6 +16,7 @@ from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
 from node_support.ros.transforms import JointAngle
 from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.ros.conversions import POINT_FIELDS, header, points_from_message
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.echoes.ray_grid import Rays, ScanLayout, rays_of_points, rays_of_scan
@@ -25,8 +25,6 @@ from sonar_simulator.ros.publisher import MESSAGES
 from sonar_simulator.simulation.simulation import Ping
 from sonar_simulator.simulation.sonar_head import SonarHead
 from underwater_map_construction.msg import SonarScanLine
-
-_NUMPY_TYPES = {PointField.FLOAT32: "f4", PointField.FLOAT64: "f8"}
 
 
 def ray_scan(message: AnyMsg, parameters: GazeboSonarParameters) -> RayScan:
@@ -59,27 +57,11 @@ def _of_point_cloud(cloud: PointCloud, parameters: GazeboSonarParameters) -> Ray
 
 
 def _of_point_cloud2(cloud: PointCloud2, parameters: GazeboSonarParameters) -> Rays:
-    columns = {name: _field(cloud, name) for name in ("x", "y", "z", "intensity")}
-    missing = [name for name in ("x", "y", "z") if columns[name] is None]
-    if missing:
-        raise RefusedInput("scans refused", f"no float field {', '.join(missing)}")
-    points = np.column_stack([columns[name] for name in ("x", "y", "z")])
-    rows = parameters.ray_rows or (cloud.height if cloud.height > 1 else 0)
-    return rays_of_points(points, columns["intensity"], rows, parameters.nothing_range)
-
-
-def _field(cloud: PointCloud2, name: str) -> Optional[np.ndarray]:
-    found = [field for field in cloud.fields if field.name == name and field.datatype in _NUMPY_TYPES]
-    if not found:
-        return None
-    count, step = cloud.width * cloud.height, cloud.point_step
-    kind = np.dtype((">" if cloud.is_bigendian else "<") + _NUMPY_TYPES[found[0].datatype])
-    if len(cloud.data) != count * step or found[0].offset + kind.itemsize > step:
-        raise RefusedInput("scans refused", f"{len(cloud.data)} bytes for {count} points of {step} bytes")
-    if count == 0:
-        return np.zeros(0)
-    row = np.dtype({"names": [name], "formats": [kind], "offsets": [found[0].offset], "itemsize": step})
-    return np.frombuffer(cloud.data, dtype=row)[name].astype(np.float64)
+    floats = [field.name for field in cloud.fields if field.datatype == PointField.FLOAT32]
+    has_intensity = POINT_FIELDS[3] in floats
+    columns = points_from_message(cloud, POINT_FIELDS if has_intensity else POINT_FIELDS[:3], "scans refused")
+    columns, rows = columns.astype(np.float64), parameters.ray_rows or (cloud.height if cloud.height > 1 else 0)
+    return rays_of_points(columns[:, :3], columns[:, 3] if has_intensity else None, rows, parameters.nothing_range)
 
 
 _KINDS: Dict[str, type] = {kind._type: kind for kind in (LaserScan, PointCloud, PointCloud2)}
@@ -141,8 +123,8 @@ class GazeboSonar:
         self._publish(ping, scan)
 
     def _publish(self, ping: Ping, scan: RayScan) -> None:
-        stamp, frame = genpy.Time(*divmod(scan.stamp_ns, 10**9)), self._parameters.frame_id
-        self._publisher.publish(MESSAGES.scan_line(ping, self._tilt.for_beam(), stamp, frame, self._beams.max_range))
+        head, reach = header(scan.stamp_ns, self._parameters.frame_id), self._beams.max_range
+        self._publisher.publish(MESSAGES.scan_line(ping, self._tilt.for_beam(), head.stamp, head.frame_id, reach))
         self.health.count("beams out")
 
 
