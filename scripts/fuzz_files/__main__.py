@@ -11,7 +11,7 @@ from typing import List
 import numpy as np
 
 from fuzz_files.mutations import mutated
-from fuzz_files.runs import INTERRUPTED, run
+from fuzz_files.runs import run
 from fuzz_files.samples import Sample, samples
 
 
@@ -26,7 +26,7 @@ def fuzz(sample: Sample, count: int, seed: int, folder: Path) -> List[str]:
         ends["read" if outcome.status == 0 else "refused"] += 1
         complaints = list(outcome.complaints(_size(path), command[0]))
         complaints += sample.maker.complaints(folder / "run/out") if sample.maker else []
-        if number == 0 and outcome.status not in (0, INTERRUPTED):
+        if number == 0 and outcome.status and not outcome.was_interrupted:
             complaints.append(f"the sound file is refused: {outcome.lines[-1:]}")
         found += [f"{sample.kind}, seed {seed}, mutation {number}, {command[0]}: {one}" for one in complaints]
     told = f"{sample.kind}: {ends['read']} read, {ends['refused']} refused, {len(found)} answered badly"

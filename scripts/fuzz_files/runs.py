@@ -24,8 +24,6 @@ PROGRAMS: Dict[str, Callable[[], None]] = {
 MOST_BYTES = 300e6
 """That a program may take beside what it took to start; where ten times the file is more, that."""
 _LIMIT = 3_000_000_000  # Bytes of addresses: what takes more is ended before it hurts the machine
-INTERRUPTED = 130
-"""Status of a program that was interrupted."""
 _PATIENCE = 60.0  # s of processor time
 _INTERRUPTED_AFTER, _ENDLESS_AFTER = 300.0, 3.0  # s
 
@@ -39,6 +37,11 @@ class Run:
     grown: float
     seconds: float
     written: List[str]
+
+    @property
+    def was_interrupted(self) -> bool:
+        """Whether it took too long."""
+        return bool(self.lines) and self.lines[-1].endswith(": interrupted")
 
     def complaints(self, size: int, program: str) -> Iterator[str]:
         """Yield in words what a user should not see; size: of the file, bytes."""

@@ -5,7 +5,7 @@ import sys
 import time
 from argparse import Namespace
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Sequence
+from typing import Any, Callable, Dict, Sequence
 
 import numpy as np
 import yaml
@@ -13,7 +13,7 @@ from tqdm import tqdm
 
 from node_support import topics
 from node_support.files import check_output, package_folder, whole_file
-from node_support.help import CommandLine
+from node_support.help import CommandLine, ending_in_one_line
 from node_support.parameters import ParameterError, assigned_values, read_values
 from recordings.bags.messages import Placing
 from recordings.bags.writers import COMPRESSIONS, BagWriter
@@ -175,24 +175,13 @@ def _set(values: Dict[str, Any], key: str, value: Any) -> None:
 
 def run_simulate_bag() -> None:
     """Run simulate_bag with the command line."""
-    sys.exit(main(sys.argv[1:]))
+    main(sys.argv[1:])
 
 
-def main(arguments: List[str]) -> int:
-    """Write the bag that a command line asks for; return the exit status. An error is reported in one line."""
-    options = parse(arguments)
-    try:
-        _run(options)
-    except (ParameterError, DescriptionError) as error:
-        print(f"simulate_bag: {error}", file=sys.stderr)
-        return 1
-    except OSError as error:
-        print(f"simulate_bag: {error.filename or options.out}: {error.strerror}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("simulate_bag: stopped; nothing was written", file=sys.stderr)
-        return 130
-    return 0
+def main(arguments: Sequence[str]) -> None:
+    """Write the bag that a command line asks for; end with one line and status 1 where that cannot be."""
+    with ending_in_one_line("simulate_bag", ParameterError, DescriptionError):
+        _run(parse(arguments))
 
 
 def _run(options: Namespace) -> None:

@@ -24,8 +24,8 @@ def script(tmp_path):
 
 def _write(tmp_path, script, name="out.bag", *arguments):
     out = tmp_path / name
-    status = main(["--world", "basin", "--script", str(script), "--out", str(out), *QUICK, *arguments])
-    return status, out
+    main(["--world", "basin", "--script", str(script), "--out", str(out), *QUICK, *arguments])
+    return out
 
 
 def _messages(path, topic):
@@ -34,10 +34,9 @@ def _messages(path, topic):
 
 
 def test_a_bag_holds_beams_tf_odometry_and_truth(tmp_path, script):
-    status, out = _write(tmp_path, script)
+    out = _write(tmp_path, script)
     with rosbag.Bag(str(out)) as bag:
         counts = {topic: info.message_count for topic, info in bag.get_type_and_topic_info()[1].items()}
-    assert status == 0
     assert counts["/sonar/raw"] == 46
     assert counts["/odom"] == counts["/ground_truth"] == counts["/cmd_vel"] == 121
     assert counts["/tf"] == counts["/joint_states"] == 121 + 46 - 16
@@ -46,7 +45,7 @@ def test_a_bag_holds_beams_tf_odometry_and_truth(tmp_path, script):
 
 def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, script):
     bags = [
-        _write(tmp_path, script, name, "--set", f"seed={seed}")[1]
+        _write(tmp_path, script, name, "--set", f"seed={seed}")
         for name, seed in (("a.bag", 5), ("b.bag", 5), ("c.bag", 6))
     ]
     first, second, third = (bag.read_bytes() for bag in bags)
@@ -57,14 +56,14 @@ def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(tmp_path, sc
 @pytest.mark.parametrize(("instruments", "begin"), [("DVL", (1.0, -2.0)), ("COMPASS", (0.0, 0.0))])
 def test_the_map_of_a_vehicle_that_knows_no_position_begins_where_it_starts(tmp_path, script, instruments, begin):
     script.write_text("start: {x: 1.0, y: -2.0, z: -1.5}\nmoves: [{wait: 1.0}]\n")
-    _, out = _write(tmp_path, script, "at.bag", "--set", f"instruments={instruments}")
+    out = _write(tmp_path, script, "at.bag", "--set", f"instruments={instruments}")
     position = _messages(out, "/ground_truth")[0][0].pose.pose.position
     assert (position.x, position.y, position.z) == pytest.approx((*begin, -1.5))
 
 
 def test_without_instruments_the_odometry_stays_where_the_vehicle_starts(tmp_path, script):
     script.write_text("start: {x: 1.0, y: -2.0, z: -1.5, yaw_deg: 90.0}\nmoves: [{x: 2.0, yaw_deg: 40.0}]\n")
-    _, out = _write(tmp_path, script, "still.bag", "--set", "instruments=NONE")
+    out = _write(tmp_path, script, "still.bag", "--set", "instruments=NONE")
     placed = [message.transforms[0] for message, _ in _messages(out, "/tf") if len(message.transforms) > 1]
     shifts = [(place.transform.translation.x, place.transform.translation.y) for place in placed]
     assert {place.child_frame_id for place in placed} == {"base_link"}
@@ -75,7 +74,7 @@ def test_without_instruments_the_odometry_stays_where_the_vehicle_starts(tmp_pat
 
 
 def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):
-    _, out = _write(tmp_path, script)
+    out = _write(tmp_path, script)
     placed = {
         message.transforms[0].header.stamp: {transform.child_frame_id for transform in message.transforms}
         for message, _ in _messages(out, "/tf")
@@ -86,14 +85,14 @@ def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):
 
 
 def test_the_truth_is_the_script_and_the_odometry_errs_as_asked(tmp_path, script):
-    _, out = _write(tmp_path, script, "out.bag", "--set", "odometry.scale_error=0.25")
+    out = _write(tmp_path, script, "out.bag", "--set", "odometry.scale_error=0.25")
     last = [_messages(out, topic)[-1][0].pose.pose.position for topic in ("/ground_truth", "/odom")]
     end = load_script(script).pose(6.0)[:2, 3]
     np.testing.assert_allclose([(p.x, p.y) for p in last], [end, end / 1.25], atol=1e-9)
 
 
 def test_the_servo_is_in_the_beams_the_joint_and_the_transform(tmp_path, script):
-    _, out = _write(tmp_path, script)
+    out = _write(tmp_path, script)
     beam, joint = _messages(out, "/sonar/raw")[-1][0], _messages(out, "/joint_states")[-1][0]
     mount = _messages(out, "/tf")[-1][0].transforms[1]
     assert joint.name == ["sonar_servo_joint"]
@@ -103,7 +102,7 @@ def test_the_servo_is_in_the_beams_the_joint_and_the_transform(tmp_path, script)
 
 
 def test_a_bag_tells_how_it_was_made_and_nothing_of_the_machine(tmp_path, script):
-    _, out = _write(tmp_path, script, "out.bag", "--set", "seed=9")
+    out = _write(tmp_path, script, "out.bag", "--set", "seed=9")
     told = yaml.safe_load(_messages(out, "/sonar_simulator/settings")[0][0].data)
     found = told["world"], told["script"], told["seed"], told["sonar"]["ray_rows"]
     assert found == ("basin.sdf", "script.yaml", 9, 5)
@@ -113,7 +112,7 @@ def test_a_bag_tells_how_it_was_made_and_nothing_of_the_machine(tmp_path, script
 def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):
     path = tmp_path / "parameters.yaml"
     path.write_text("seed: 3\nlaser_cone: {bins: 100, max_range: 25.0}")
-    _, out = _write(tmp_path, script, "out.bag", "--parameters", str(path), "--set", "laser_cone.bins=50")
+    out = _write(tmp_path, script, "out.bag", "--parameters", str(path), "--set", "laser_cone.bins=50")
     beam = _messages(out, "/sonar/raw")[0][0]
     assert (len(beam.intensities), beam.maxrange_meters) == (50, 25.0)
 
@@ -129,34 +128,30 @@ def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):
         (["--parameters", "none.yaml"], "none.yaml: No such file or directory"),
     ],
 )
-def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path, script, capsys, arguments, line):
-    status, out = _write(tmp_path, script, "out.bag", *arguments)
-    error = capsys.readouterr().err
-    assert status == 1
-    assert line in error
-    assert error.count("\n") == 1
-    assert not out.exists()
+def test_what_is_wrong_is_one_line_and_nothing_is_written(tmp_path, script, arguments, line):
+    with pytest.raises(SystemExit) as ended:
+        _write(tmp_path, script, "out.bag", *arguments)
+    assert line in ended.value.code
+    assert "\n" not in ended.value.code
+    assert not (tmp_path / "out.bag").exists()
 
 
-def test_without_the_ray_caster_one_line_says_what_to_install(tmp_path, script, capsys, monkeypatch):
+def test_without_the_ray_caster_one_line_says_what_to_install(tmp_path, script, monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
-    status, out = _write(tmp_path, script)
-    error = capsys.readouterr().err
-    assert status == 1
-    assert error.count("\n") == 1
-    assert error.endswith("-m pip install embreex\n")
-    assert not out.exists()
+    with pytest.raises(SystemExit, match=r"^simulate_bag: .*-m pip install embreex$"):
+        _write(tmp_path, script)
+    assert not (tmp_path / "out.bag").exists()
 
 
-def test_a_bag_that_could_not_be_finished_leaves_the_older_one(tmp_path, script, monkeypatch, capsys):
-    _, out = _write(tmp_path, script)
+def test_a_bag_that_could_not_be_finished_leaves_the_older_one(tmp_path, script, monkeypatch):
+    out = _write(tmp_path, script)
     before = out.read_bytes()
 
     def stop(*_):
         raise KeyboardInterrupt
 
     monkeypatch.setattr("sonar_simulator.simulation.simulate_bag.SimulatedBag.add", stop)
-    assert _write(tmp_path, script, "out.bag", "--overwrite")[0] == 130
-    assert "nothing was written" in capsys.readouterr().err
+    with pytest.raises(SystemExit, match="interrupted"):
+        _write(tmp_path, script, "out.bag", "--overwrite")
     assert out.read_bytes() == before
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out.bag", "script.yaml"]
