@@ -28,50 +28,44 @@ class LiveCorrection:
 
     def __init__(self, blend_time: float) -> None:
         self.blend_time = blend_time
-        self._lock = threading.Lock()
-        self._forget()
+        self._lock = threading.RLock()
+        self.clear()
 
     def clear(self) -> None:
         """Forget everything, because time jumped or the map is gone."""
         with self._lock:
-            self._forget()
+            self.start = _IDENTITY
+            self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
+            self._state: Optional[np.ndarray] = None
+            self._state_time = -math.inf
+            self._jump = _IDENTITY
+            self._jump_time: Optional[float] = None
+            self._shown: Optional[np.ndarray] = None
+            self._fading: Optional[Fading] = None
+            self._beliefs = UsualInterval()
 
     def start_from(self, correction: np.ndarray) -> None:
         """Show `correction` T_map_odom (3,) until the first belief."""
         with self._lock:
             self.start = np.array(correction, dtype=np.float64)
 
-    def _forget(self) -> None:
-        self.start = _IDENTITY
-        self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
-        self._state: Optional[np.ndarray] = None
-        self._state_time = -math.inf
-        self._jump = _IDENTITY
-        self._jump_time: Optional[float] = None
-        self._shown: Optional[np.ndarray] = None
-        self._fading: Optional[Fading] = None
-        self._beliefs = UsualInterval()
-
     def believe(self, belief: Belief) -> None:
         """Take what a match found at a time in the past; the samples since then bring it to now."""
         with self._lock:
-            self._believe(belief)
-
-    def _believe(self, belief: Belief) -> None:
-        self._state, self._fading = np.array(belief.theta), belief.fading
-        start = self._state_time = belief.time
-        self._beliefs.take(start)
-        later = [sample for sample in self._samples if sample[0] > belief.time]
-        earlier = [sample for sample in self._samples if sample[0] <= belief.time]
-        if later:
-            known = earlier[-1:] + later
-            times = np.array([time for time, _ in known])
-            track = Track(times, np.array([pose for _, pose in known]))
-            self._bring_on(start, track, times[times > start])
-        if self._shown is not None and self._samples:
-            self._jump = composed(inverse(self._state[POSE]), self._shown)
-            self._jump[2] = wrapped(self._jump[2])
-            self._jump_time = None
+            self._state, self._fading = np.array(belief.theta), belief.fading
+            start = self._state_time = belief.time
+            self._beliefs.take(start)
+            later = [sample for sample in self._samples if sample[0] > belief.time]
+            earlier = [sample for sample in self._samples if sample[0] <= belief.time]
+            if later:
+                known = earlier[-1:] + later
+                times = np.array([time for time, _ in known])
+                track = Track(times, np.array([pose for _, pose in known]))
+                self._bring_on(start, track, times[times > start])
+            if self._shown is not None and self._samples:
+                self._jump = composed(inverse(self._state[POSE]), self._shown)
+                self._jump[2] = wrapped(self._jump[2])
+                self._jump_time = None
 
     def sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
         """Take T_odom_base (3,) at `time` [s] and return T_map_odom (3,) to be shown now.
@@ -79,29 +73,26 @@ class LiveCorrection:
         Times that do not increase change nothing.
         """
         with self._lock:
-            return self._sample(time, odometry)
+            odometry = np.asarray(odometry, dtype=np.float64)
+            if self._samples and time <= self._samples[-1][0]:
+                time, odometry = self._samples[-1]
+            else:
+                self._follow(time, odometry)
+                self._samples.append((time, odometry))
+            if self._state is None:
+                return self.start
+            if self._jump_time is None:
+                self._jump_time = time
+            left = self._share_left(time - self._jump_time)
+            self._shown = composed(self._state[POSE], left * self._jump) if left else self._state[POSE].copy()
+            return _correction(self._shown, odometry)
 
     def standing_sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
         """Return what `sample` does for an odometry without times, in which no error can go on after a belief."""
         with self._lock:
             if self._state is not None:
                 self._state[RATE], self._fading = 0.0, None
-            return self._sample(time, odometry)
-
-    def _sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
-        odometry = np.asarray(odometry, dtype=np.float64)
-        if self._samples and time <= self._samples[-1][0]:
-            time, odometry = self._samples[-1]
-        else:
-            self._follow(time, odometry)
-            self._samples.append((time, odometry))
-        if self._state is None:
-            return self.start
-        if self._jump_time is None:
-            self._jump_time = time
-        left = self._share_left(time - self._jump_time)
-        self._shown = composed(self._state[POSE], left * self._jump) if left else self._state[POSE].copy()
-        return _correction(self._shown, odometry)
+            return self.sample(time, odometry)
 
     def _follow(self, time: float, odometry: np.ndarray) -> None:
         if self._state is None or not self._samples:

@@ -90,7 +90,7 @@ class Localiser:
         with self._lock:
             self._settings = settings
             self.estimator.matcher = settings.matcher
-            self.following.use(settings.blend_time)
+            self.following.live.blend_time = settings.blend_time
 
     @property
     def matching(self) -> bool:
@@ -116,7 +116,7 @@ class Localiser:
         """Learn where the sonar is in base_link, (2,) m."""
         with self._lock:
             self.estimator.mount(sonar_in_base)
-            self.following.mount(sonar_in_base)
+            self.following.found.sonar_in_base = sonar_in_base
 
     @property
     def odometry(self) -> str:
@@ -188,7 +188,7 @@ class Localiser:
         if until is None or until - _JUMP_BACK <= time <= until + _LEAP:
             return 0.0
         with self._lock:
-            goes_on = odometry is not None and self.following.goes_on_at(odometry)
+            goes_on = odometry is not None and self.following.odometry.goes_on_at(odometry)
             if time > until and not goes_on:
                 return 0.0
             place = StoredPlace(self.last_correction, self.estimator.belief)
@@ -215,7 +215,7 @@ class Localiser:
 
     def _expect(self, correction: np.ndarray, belief: Belief) -> None:
         self.estimator.start_from(belief, correction)
-        self.following.start_from(correction)
+        self.following.live.start_from(correction)
         self._search.expect()
 
     def check_time(self, time: float) -> None:
@@ -252,7 +252,7 @@ class Localiser:
             update = self._adopted(scan, result)
             if update.accepted:
                 self._search.forget()
-                self.following.believe(update.belief)
+                self.following.live.believe(update.belief)
         return update
 
     def _searched(self, scan: Scan) -> ScanUpdate:
@@ -324,7 +324,7 @@ class Localiser:
         with self._lock:
             belief, copies = self.estimator.belief, {one: self.estimator.map_of(one).begin_copy() for one in Layer}
             # After a step a run goes on only in this process, which knows it.
-            keyframes = self.estimator.keyframes if run and not self.following.steps else {}
+            keyframes = self.estimator.keyframes if run and not self.following.odometry.steps else {}
             correction = self.last_correction
         arrays = {} if belief is None else {**StoredPlace(correction, belief).arrays(), **keyframes}
         if self.origin is not None:

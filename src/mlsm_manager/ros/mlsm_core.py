@@ -59,7 +59,7 @@ class MlsmCore:
         self._odometry = OdometryTrack(
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
-        self._localiser.following.notice_standing(self._odometry.stood)
+        self._localiser.following.odometry.stood = self._odometry.stood
         self._mounted = False
         self._steps_told = 0
         self._z_down = ZDownSigns()
@@ -144,8 +144,8 @@ class MlsmCore:
         if taken.scan.loop:
             rospy.loginfo("%s: %s", self.health.name, taken.scan.loop)
         report_turn(self.health, scan.reference_time - scan.start, self._longest_turn)
-        report_steps(self.health, self._localiser.following.steps, self._steps_told)
-        self._steps_told = len(self._localiser.following.steps)
+        report_steps(self.health, self._localiser.following.odometry.steps, self._steps_told)
+        self._steps_told = len(self._localiser.following.odometry.steps)
         self.status.verdicts, self.status.is_provisional = self._localiser.verdicts(), taken.scan.provisional
         report_verdicts(self.health, self.status.verdicts)
         self.health.show("odometry", self._localiser.odometry or self._live.current.odometry.value)

@@ -93,7 +93,7 @@ class StatusTeller:
             self._publish(state, text, place, T_map_base)
 
     def _look_and_tell(self) -> None:
-        self._localiser.following.look_for_causes()
+        self._localiser.following.found.look()
         self.tell()
 
     def _place_now(self) -> Tuple[Optional[PlaceNow], Optional[np.ndarray]]:

@@ -242,7 +242,7 @@ def test_scans_that_are_not_matched_are_not_compared():
     localiser.match(False)
     for scan in scans_in(broken.mount_turned(WHOLE, 120.0)):
         localiser.take_scan(scan)
-    localiser.following.look_for_causes()
+    localiser.following.found.look()
     assert localiser.following.causes() == []
 
 

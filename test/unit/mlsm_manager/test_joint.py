@@ -210,7 +210,7 @@ def test_a_jump_of_the_odometry_leaves_position_and_map_where_they_are(size):
         update = jumped.take_scan(replace(scan, points=points, track=Track(track.times, poses))).scan
         other = whole.take_scan(scan).scan
         assert np.hypot(*(update.belief.theta - other.belief.theta)[:2]) < 0.5
-    (step,) = jumped.following.steps
+    (step,) = jumped.following.odometry.steps
     assert step.time == pytest.approx(moment, abs=0.5)
     now, pose = SCANS[8].reference_time, SCANS[8].reference_pose
     places = [composed(one.following.correction(now + 1.0, odom), odom) for one, odom in (
