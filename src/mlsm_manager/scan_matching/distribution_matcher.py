@@ -9,7 +9,7 @@ import numpy as np
 from mlsm_manager.scan_matching.correlative_search import YAW_STEP, ScoreField, SearchWindow, search, separation
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.gauss_newton import Fit, PriorState, Refiner
-from mlsm_manager.scan_matching.judgement import agreement
+from mlsm_manager.scan_matching.judgement import agreement, lead_along, significance
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
 from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion, X, Y
@@ -36,6 +36,7 @@ class MatcherLimits:
     min_points: of a scan, on the map. max_jump: of a fix from the expected pose, in the prior's standard deviations.
     max_position_deviation, max_yaw_deviation: of a fix, in its least certain direction.
     min_gain_over_second: lead in log-likelihood [nat] of the best pose over any other.
+    min_significance: lead of the matched share of points over that of random poses, in standard deviations.
     min_explained: share of all echoes that lie on the map.
     min_agreement: share of echoes that the map explains times share of the map that no echo denies.
     same_place: poses nearer than this that fit nearly as well widen the covariance; farther ones refuse the fix.
@@ -52,6 +53,7 @@ class MatcherLimits:
     max_position_deviation: float = 0.5
     max_yaw_deviation: float = 0.1  # 6 deg: at 10 m a point is then a metre off
     min_gain_over_second: float = 3.0  # the best place is e^3, 20 times, as likely as the second-best
+    min_significance: float = 5.0  # chance alone leads by so much once in millions of scans
     min_explained: float = 0.0  # near the expected place part of a scan may be of unknown water
     min_agreement: float = 0.8  # a wrong place seldom explains so much; boats and tide explain less at the right one
     same_place: float = 0.0  # near the expected place the next scan decides
@@ -95,7 +97,7 @@ class DistributionMatcher:
         status, reason = self._judge(best, refiner, state, blocks)
         if status is MatchStatus.CONVERGED:
             best = replace(best, covariance=refiner.residual_covariance(best))
-            status, reason = self._judge_second_places(best, fits[1:])
+            status, reason = self._judge_second_places(best, fits[1:], refiner)
             best = self._covering(best, fits[1:])
         return _result(status, reason, motion, best, start)
 
@@ -131,6 +133,9 @@ class DistributionMatcher:
         used = int(np.count_nonzero(best.inliers))
         if used < limits.min_points:
             return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {limits.min_points} or more"
+        certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
+        if certainty < limits.min_significance:
+            return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
         jump = float(np.sqrt(2.0 * state.prior_cost(best.theta)))
         if jump > limits.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
@@ -151,7 +156,7 @@ class DistributionMatcher:
             return MatchStatus.AMBIGUOUS, f"heading has a standard deviation of {yaw:.3f} rad"
         return MatchStatus.CONVERGED, ""
 
-    def _judge_second_places(self, best: Fit, others: List[Fit]) -> Tuple[MatchStatus, str]:
+    def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
         """Reject a fix whose covariance excludes a pose of another place that fits nearly as well."""
         least = self.limits.min_gain_over_second
         if least == 0.0:
@@ -162,6 +167,12 @@ class DistributionMatcher:
             if lead < least and is_apart and _excluded(best, other.theta):
                 reason = f"another pose fits nearly as well: its log-likelihood is only {lead:.1f} less"
                 return MatchStatus.AMBIGUOUS, reason
+        values, vectors = np.linalg.eigh(best.covariance[POSITION, POSITION])
+        excluded = max(_EXCLUDED * float(np.sqrt(values[-1])), self.limits.same_place)
+        lead = lead_along(lambda moves: refiner.gains(best, moves), vectors[:, -1], excluded)
+        if lead < least:
+            reason = f"a pose beside it fits nearly as well: its log-likelihood is only {lead:.1f} less"
+            return MatchStatus.AMBIGUOUS, reason
         return MatchStatus.CONVERGED, ""
 
     def _is_same_place(self, best: Fit, other: Fit) -> bool:

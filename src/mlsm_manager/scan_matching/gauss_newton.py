@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.point_equations import Normal, PointEquations, log_likelihood_gain
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
-from mlsm_manager.scan_matching.scan_path import PlanarMotion
+from mlsm_manager.scan_matching.scan_path import POSE, PlanarMotion
 
 # Standard deviations at which the robust kernel bends: wide enough for a start one search cell off, narrow at the end.
 SCALES = (8.0, 4.0, 2.5)
@@ -90,6 +90,17 @@ class Refiner:
             if small or iteration % _ITERATIONS_PER_SCALE == 0:
                 index = min(index + 1, narrowest)
         return self._fit(theta, iteration, converged)
+
+    def matched_shares(self, theta: np.ndarray, moves: np.ndarray) -> np.ndarray:
+        """Return (k,) which share of the points lies on the map when the pose of `theta` is moved by `moves` (k, 3)."""
+        return self._points.matched_shares(theta, moves, SCALES[-1])
+
+    def gains(self, fit: Fit, moves: np.ndarray) -> np.ndarray:
+        """Return (k,) what `fit.gain` would be if it had ended at its state moved by `moves` (k, 3)."""
+        log_likelihood_gains = self._points.log_likelihood_gains(fit.theta, moves, SCALES[-1])
+        moved = np.tile(fit.theta, (len(moves), 1))
+        moved[:, POSE] += moves
+        return log_likelihood_gains / fit.inflation - np.array([self._prior.prior_cost(theta) for theta in moved])
 
     def world(self, theta: np.ndarray) -> np.ndarray:
         """Return the points (n, 2) in map when the state is `theta`."""

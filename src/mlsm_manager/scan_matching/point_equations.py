@@ -8,7 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.distributions import LocalDistributions
-from mlsm_manager.scan_matching.scan_path import STATES, PlanarMotion
+from mlsm_manager.scan_matching.scan_path import POSITION, STATES, PlanarMotion
+from node_support.geometry import rotated
 
 INLIER = 3.0  # standard deviations: of a planar Gaussian, 99 % lie within three
 # m per standard deviation of the kernel: no block of another surface within a gate of 6 m at first, 1.9 m at last.
@@ -97,6 +98,18 @@ class PointEquations:
         weighted_arms = np.einsum("nab,nb->na", weighted, correspondences.arms)
         return Normal(correspondences, gradient, jacobian, weighted_jacobian, weighted_arms, weight)
 
+    def matched_shares(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+        """Return (k,) which share of the points lies on a surface when `theta` is moved by `moves` (k, 3)."""
+        correspondences = self._moved(theta, moves)
+        matched = (correspondences.squared < INLIER**2) & (correspondences.distances < _GATE * scale)
+        return matched.reshape(len(moves), -1).mean(axis=1)
+
+    def log_likelihood_gains(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+        """Return (k,) log-likelihood gain [nat] over no correspondences, when `theta` is moved by `moves` (k, 3)."""
+        correspondences = self._moved(theta, moves)
+        each = self._weights(correspondences, scale) * _saved(correspondences.squared, scale)
+        return each.reshape(len(moves), -1).sum(axis=1)
+
     def weighed(self, normal: Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
         """Return information (8, 8) and gradient (8,) of all points, each worth 1 / `inflation` of one."""
         information, gradient = normal.information / inflation, normal.gradient.sum(axis=0) / inflation
@@ -138,13 +151,25 @@ class PointEquations:
     def map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return the share of the points' information that is left after the map's own noise.
 
-        nearest: (n,), the blocks of the points. k points of a scan that are compared with the same m points of the map
-        err by s^2/k + s^2/m together, and the fit cannot see the second part.
+        nearest: (k n,), the blocks of the points at k places, one place after the other.
+        k points of a scan that are compared with the same m points of the map err by s^2/k + s^2/m together, and the
+        fit cannot see the second part.
         """
         window = self._target.window[nearest][:, np.newaxis]
-        scan_points = np.exp(-0.5 * (self._apart / window) ** 2).sum(axis=1)
+        apart = np.tile(self._apart, (len(nearest) // len(self._apart), 1))
+        scan_points = np.exp(-0.5 * (apart / window) ** 2).sum(axis=1)
         map_points = self._target.point_count[nearest]
         return map_points / (map_points + scan_points)
+
+    def _moved(self, theta: np.ndarray, moves: np.ndarray) -> Correspondences:
+        """Return the correspondences when the pose is moved by `moves` (k, 3): of k times n points in a row."""
+        path = self._motion.path(theta)
+        world = self._motion.points(path)
+        turn = moves[:, np.newaxis, 2]
+        turned = rotated(world - theta[POSITION], turn) + theta[POSITION] + moves[:, np.newaxis, :2]
+        return self._correspondences(
+            turned.reshape(-1, 2), rotated(self._motion.arms(world, path), turn).reshape(-1, 2)
+        )
 
     def _correspondences(self, world: np.ndarray, arms: np.ndarray) -> Correspondences:
         distances, nearest = self._target.nearest(world)
