@@ -116,7 +116,7 @@ ROWS = (
     FaultRow("delay grows to {} s", broken.delayed, _STAMPS, "seconds", 6.0, others={"growing": True}),
     FaultRow("odometry stalls {} s each minute", rare.odometry_stalls, "odometry stalled", "seconds", 5.0),
     FaultRow("positions stand {} s each minute", rare.velocities_missing, "positions stood", "seconds", 5.0),
-    FaultRow("odometry trembles by {} m", rare.odometry_noisy, "", "metres", 0.2),
+    FaultRow("odometry trembles by {} m", rare.odometry_noisy, "positions tremble", "metres", 0.2),
     FaultRow("odometry drifts by {} m/s", rare.odometry_drifts, "", "speed", 0.1, others={"at": 0.0}),
     FaultRow("bottom lost for {} s", rare.bottom_lost, "was carried", "seconds", 60.0, begins=True),
     FaultRow("odometry counts z down", rare.odometry_mirrored, _OVER),

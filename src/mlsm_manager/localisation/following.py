@@ -10,7 +10,7 @@ from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.place_now import FixAge, PlaceNow
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
-from mlsm_manager.odometry.trembling import with_headings_smoothed
+from mlsm_manager.odometry.trembling import with_trembling_smoothed
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
@@ -41,8 +41,8 @@ class Following:
         self._came = None
 
     def taken(self, scan: Scan) -> Scan:
-        """Learn a scan's odometry, and return the scan with one that goes on, and whose headings do not tremble."""
-        odometry, (smooth, trembling) = self.odometry, with_headings_smoothed(scan.track)
+        """Learn a scan's odometry, and return the scan with one that goes on, which does not tremble."""
+        odometry, (smooth, trembling) = self.odometry, with_trembling_smoothed(scan.track)
         self._came = scan.reference_time, self._clock()
         if trembling:
             odometry.trembling = odometry.trembling or trembling

@@ -1,5 +1,5 @@
 """A recorded odometry mended where it says of itself that it was wrong: held poses, steps of compass and position, and
-headings that tremble.
+poses that tremble.
 """
 
 from typing import Iterator, List, NamedTuple, Tuple
@@ -7,7 +7,7 @@ from typing import Iterator, List, NamedTuple, Tuple
 import numpy as np
 
 from mlsm_manager.odometry.steps import LEAST_STEP, ContinuousOdometry, MotionLimits, Step, StepKind, impossible_steps
-from mlsm_manager.odometry.trembling import with_headings_smoothed
+from mlsm_manager.odometry.trembling import with_trembling_smoothed
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import rotated, wrapped
 from node_support.timing import stretches
@@ -35,7 +35,7 @@ class Mended(NamedTuple):
 def mended(track: Track, limits: MotionLimits) -> Mended:
     """Return a track that a vehicle can have gone, and what was mended."""
     stuck = stuck_headings(track)
-    track, trembling = with_headings_smoothed(track)
+    track, trembling = with_trembling_smoothed(track)
     track, held = _with_holds_bridged(track, limits)
     track, compass = _with_headings_mended(track, limits)
     odometry = ContinuousOdometry(limits)

@@ -41,12 +41,13 @@ class MotionLimits(ParameterSet):
 
 
 class StepKind(Enum):
-    """What an impossible step looks like; headings that tremble take many."""
+    """What an impossible step looks like; poses that tremble take many."""
 
     JUMPED = "odometry jumped by {size:.1f} m"
     RESTARTED = "odometry started again from zero, {size:.1f} m off"
     COMPASS = "compass stepped by {turn:.0f} deg"
     TREMBLES = "the compass trembles by about {turn:.0f} deg"
+    SCATTERS = "reported positions tremble by about {size:.1f} m"
     STALLED = "odometry stalled, and missed {size:.1f} m and {turn:.0f} deg"
     POSITIONS = "positions stood while the heading went on, and missed {size:.1f} m"
 
@@ -83,7 +84,8 @@ class ContinuousOdometry:
     after a step hang together as they were reported. While the odometry stalls it goes on likewise. What it reports at
     once after its clock has stood is no step.
 
-    stood: from when to when [s] its stamps went on after they had stood. trembling: of headings, at most one.
+    stood: from when to when [s] its stamps went on after they had stood. trembling: at most one of
+    positions and one of headings.
 
     Safe to use from several threads: one gives it scans, another asks for what holds now.
     """

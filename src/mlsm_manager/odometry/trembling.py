@@ -1,4 +1,4 @@
-"""Headings that each err by themselves, as no vehicle turns: found, and smoothed."""
+"""Positions and headings that each err by themselves, as no vehicle moves: found, and smoothed."""
 
 from typing import List, Tuple
 
@@ -9,51 +9,58 @@ import scipy.sparse.linalg
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Track
 
-_TREMBLES = np.radians(2.0)  # standard deviation of each heading by itself: compasses have a tenth of it
+_TREMBLES = np.array([0.1, 0.1, np.radians(2.0)])  # m, rad: of a pose by itself; DVLs and compasses have a tenth of it
 _POSES = 100  # that tell it
-_OPPOSED = 0.6  # share of neighbours on opposite sides of a smooth heading: .73 by noise, half in waves and turns
-_STEADY = 1e-3  # rad: noise of headings that do not tremble
-_AGILITY = 0.05  # rad/s/sqrt(s): random walk of the turn rate of a small vehicle
-_YAW = 2  # column of poses
+_OPPOSED = 0.6  # share of neighbours on opposite sides of a smooth path: .73 by noise, half in waves and turns
+_STEADY = 1e-3  # m, rad: noise of poses that do not tremble
+_AGILITY = np.array([0.1, 0.1, 0.05])  # m/s/sqrt(s), rad/s/sqrt(s): random walk of a small vehicle's speeds
+_OF_NORMAL = 1.48  # standard deviation of normal noise over its median size, which steps do not change
 
 
-def with_headings_smoothed(track: Track) -> Tuple[Track, List[Step]]:
-    """Return a track whose headings were smoothed where they tremble, and by how much they did; none where nowhere."""
-    noise = _noise(track)
-    trembles = noise > _TREMBLES
-    if not trembles.any():
-        return track, []
-    poses = track.poses.copy()
-    smoothed = _smoothed(track.times, poses[:, _YAW], np.where(trembles, noise, _STEADY))
-    poses[trembles, _YAW] = smoothed[trembles]
-    begin = float(track.times[np.argmax(trembles)])
-    return track.with_poses(poses), [Step(StepKind.TREMBLES, begin, 0.0, float(np.median(noise[trembles])))]
-
-
-def _noise(track: Track) -> np.ndarray:
-    """Return the standard deviation (m,) [rad] of each heading by itself, against those just before and after it.
-
-    Zero where headings go on as a vehicle turns: then errors of neighbours are as often on one side as on both.
+def with_trembling_smoothed(track: Track) -> Tuple[Track, List[Step]]:
+    """Return a track whose positions and headings were smoothed where they tremble, and by how much they did; none
+    where nowhere.
     """
-    noise, steps = np.zeros(len(track.times)), np.diff(track.times)
+    poses, noise = track.poses.copy(), np.column_stack([_noise(track.times, column) for column in track.poses.T])
+    trembles = noise > _TREMBLES
+    for axis in np.flatnonzero(trembles.any(axis=0)):
+        own = trembles[:, axis]
+        smoothed = _smoothed(track.times, poses[:, axis], np.where(own, noise[:, axis], _STEADY), _AGILITY[axis])
+        poses[own, axis] = smoothed[own]
+    steps, moves, turns = [], trembles[:, :2].any(axis=1), trembles[:, 2]
+    if moves.any():
+        size = float(np.median(np.hypot(*noise[moves, :2].T)) / np.sqrt(2.0))
+        steps.append(Step(StepKind.SCATTERS, float(track.times[np.argmax(moves)]), size, 0.0))
+    if turns.any():
+        turn = float(np.median(noise[turns, 2]))
+        steps.append(Step(StepKind.TREMBLES, float(track.times[np.argmax(turns)]), 0.0, turn))
+    return (track.with_poses(poses), steps) if steps else (track, [])
+
+
+def _noise(times: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """Return the standard deviation (m,) of each of `values` (m,) by itself, against those just before and after it.
+
+    Zero where they go on as a vehicle does: then errors of neighbours are as often on one side as on both.
+    """
+    noise, steps = np.zeros(len(times)), np.diff(times)
     share = steps[1:] / (steps[:-1] + steps[1:])
-    expected = share * track.poses[:-2, _YAW] + (1.0 - share) * track.poses[2:, _YAW]
-    apart = (track.poses[1:-1, _YAW] - expected) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
+    expected = share * values[:-2] + (1.0 - share) * values[2:]
+    apart = (values[1:-1] - expected) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
     edges = np.linspace(0, len(apart), len(apart) // _POSES + 1).astype(int)
     for first, last in zip(edges[:-1], edges[1:]):
         near = apart[first:last]
         if np.mean(near[1:] * near[:-1] < 0.0) > _OPPOSED:
             # Besides its own poses a stretch has the first and the last one of the track, which have one neighbour.
             own = slice(first and first + 1, last + 1 if last < len(apart) else None)
-            noise[own] = 1.253 * np.abs(near).mean()
+            noise[own] = _OF_NORMAL * np.median(np.abs(near))
     return noise
 
 
-def _smoothed(times: np.ndarray, yaws: np.ndarray, noise: np.ndarray) -> np.ndarray:
-    """Return headings (m,) [rad] of a turn rate that walks, likeliest by `yaws` (m,) that err by `noise` (m,)."""
+def _smoothed(times: np.ndarray, values: np.ndarray, noise: np.ndarray, agility: float) -> np.ndarray:
+    """Return what is likeliest (m,) by `values` (m,) that err by `noise` (m,), if its rate walks by `agility`."""
     steps = np.diff(times)
     slopes = [1.0 / steps[:-1], -1.0 / steps[:-1] - 1.0 / steps[1:], 1.0 / steps[1:]]
     changes = scipy.sparse.diags(slopes, [0, 1, 2], shape=(len(times) - 2, len(times)))
-    weights = scipy.sparse.diags(2.0 / (steps[:-1] + steps[1:]) / _AGILITY**2)
+    weights = scipy.sparse.diags(2.0 / (steps[:-1] + steps[1:]) / agility**2)
     information = scipy.sparse.diags(noise**-2.0) + changes.T @ weights @ changes
-    return scipy.sparse.linalg.spsolve(information.tocsc(), yaws / noise**2)
+    return scipy.sparse.linalg.spsolve(information.tocsc(), values / noise**2)

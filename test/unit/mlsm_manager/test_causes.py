@@ -117,6 +117,13 @@ def test_headings_that_tremble_are_smoothed(begin):
     assert np.degrees(np.std(mended.track.poses[:, 2] - WHOLE.track.poses[:, 2])) < 2.0
 
 
+def test_positions_that_tremble_are_smoothed():
+    mended, causes = with_odometry_mended(rare.odometry_noisy(WHOLE, 0.5), LIMITS)
+    assert [cause.text for cause in causes] == ["reported positions tremble by about 0.5 m"]
+    assert causes[0].is_mended
+    assert np.std(mended.track.poses[:, :2] - WHOLE.track.poses[:, :2]) < 0.2
+
+
 def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on():
     noise = np.radians(5.0) * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
     scan, following = scans_in(broken.with_compass_error(WHOLE, noise, False))[2], Following(LIMITS, 1.0, monotonic)
