@@ -18,6 +18,8 @@ _COURSE = 20.0  # s before and after a step in which the vehicle shows which way
 _GOES = 1.0  # m in these: less does not tell a course
 _FOLLOWS = 0.5  # share of a step of the heading, halfway between a course that turns against it and one that does not
 _TURNS = 200  # between poses, that show whether a heading is measured
+_MOSTLY, _FEWEST = 0.5, 20  # share of poses that repeat the one before, and others besides, where an odometry repeats
+_SLOW = 0.5  # s: what is repeated for less is as good as told evenly
 _TO_AND_FRO = 0.1  # share of neighbouring turns of a measured heading that have opposite signs
 
 
@@ -35,12 +37,13 @@ class Mended(NamedTuple):
 def mended(track: Track, limits: MotionLimits) -> Mended:
     """Return a track that a vehicle can have gone, and what was mended."""
     stuck = stuck_headings(track)
+    track, repeats = _without_repeats(track)
     track, trembling = with_trembling_smoothed(track)
     track, held = _with_holds_bridged(track, limits)
     track, compass = _with_headings_mended(track, limits)
     odometry = ContinuousOdometry(limits)
     odometry.take(track)
-    steps = sorted([*trembling, *compass, *odometry.steps], key=lambda step: step.time)
+    steps = sorted([*repeats, *trembling, *compass, *odometry.steps], key=lambda step: step.time)
     return Mended(odometry.followed(track), steps, held, stuck)
 
 
@@ -68,6 +71,19 @@ def stuck_headings(track: Track) -> List[Tuple[float, float]]:
         for first, last in standing
         if np.hypot(*np.ptp(track.poses[first : last + 1, :2], axis=0)) > _GOES
     ]
+
+
+def _without_repeats(track: Track) -> Tuple[Track, List[Step]]:
+    """Leave out poses that repeat the one before, where most do: nothing tells between how the vehicle went."""
+    same = (np.diff(track.poses, axis=0) == 0.0).all(axis=1)
+    for first, last in standing_stretches(track):
+        same[first:last] = False
+    again = np.append(False, same)
+    if np.mean(again) < _MOSTLY or np.count_nonzero(~again) < _FEWEST:
+        return track, []
+    kept = Track(track.times[~again], track.poses[~again])
+    seconds = float(np.median(np.diff(kept.times)))
+    return (kept, [Step(StepKind.REPEATED, float(track.times[0]), seconds, 0.0)]) if seconds > _SLOW else (track, [])
 
 
 def _with_holds_bridged(track: Track, limits: MotionLimits) -> Tuple[Track, List[Tuple[float, float]]]:

@@ -47,6 +47,7 @@ class StepKind(Enum):
     RESTARTED = "odometry started again from zero, {size:.1f} m off"
     COMPASS = "compass stepped by {turn:.0f} deg"
     TREMBLES = "the compass trembles by about {turn:.0f} deg"
+    REPEATED = "the odometry repeats each pose for about {size:.1f} s"
     SCATTERS = "reported positions tremble by about {size:.1f} m"
     STALLED = "odometry stalled, and missed {size:.1f} m and {turn:.0f} deg"
     POSITIONS = "positions stood while the heading went on, and missed {size:.1f} m"

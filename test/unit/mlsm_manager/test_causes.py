@@ -117,6 +117,14 @@ def test_headings_that_tremble_are_smoothed(begin):
     assert np.degrees(np.std(mended.track.poses[:, 2] - WHOLE.track.poses[:, 2])) < 2.0
 
 
+def test_poses_that_are_told_again_and_again_are_left_out():
+    times = WHOLE.track.times
+    told = Track(times, WHOLE.track.at(times[0] + 2.0 * np.floor((times - times[0]) / 2.0)))
+    mended, causes = with_odometry_mended(WHOLE.with_track(told), LIMITS)
+    assert [cause.text for cause in causes] == ["the odometry repeats each pose for about 2.0 s"]
+    assert np.abs(mended.track.at(times) - WHOLE.track.poses)[:-20].max() < 0.3
+
+
 def test_positions_that_tremble_are_smoothed():
     mended, causes = with_odometry_mended(rare.odometry_noisy(WHOLE, 0.5), LIMITS)
     assert [cause.text for cause in causes] == ["reported positions tremble by about 0.5 m"]
