@@ -81,7 +81,7 @@ def _without_repeats(track: Track) -> Tuple[Track, List[Step]]:
     again = np.append(False, same)
     if np.mean(again) < _MOSTLY or np.count_nonzero(~again) < _FEWEST:
         return track, []
-    kept = Track(track.times[~again], track.poses[~again])
+    kept = track.chosen(~again)
     seconds = float(np.median(np.diff(kept.times)))
     return (kept, [Step(StepKind.REPEATED, float(track.times[0]), seconds, 0.0)]) if seconds > _SLOW else (track, [])
 

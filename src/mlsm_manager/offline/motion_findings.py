@@ -6,6 +6,8 @@ from typing import List, NamedTuple, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult
+from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
+from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
@@ -14,6 +16,8 @@ from mlsm_manager.odometry.faults import FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, Fault
 from mlsm_manager.self_check.course import course_causes, course_of
+from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
+from mlsm_manager.self_check.hypotheses import Hypothesis
 from node_support.geometry import composed, inverse, rotated, transformed
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
@@ -26,6 +30,7 @@ _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may com
 _ROUNDS = 2
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
 _FAULTS = 3  # at most, one after the other
+_UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _FEWEST = 15  # nodes: fewer do not tell a change from noise
 
 
@@ -57,7 +62,22 @@ class MotionFindings:
         course, places = course_of(path), _places(self.run)
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
-        return replace(self, causes=[*self.causes, *course_causes(course)], apart=[*self.apart, aside])
+        turned = course_causes(course) or self._calibration_causes()
+        return replace(self, causes=[*self.causes, *turned], apart=[*self.apart, aside])
+
+    def _calibration_causes(self) -> List[Cause]:
+        """Return what is unlikely of the direction and the delay that the run found."""
+        (model, parameters), found = (self.run.odometry, self.run.parameters), []
+        delay = self.run.state.run[DELAY] - parameters.run_mean(self.run.log)[DELAY]
+        size = abs(delay) / max(parameters.run_deviations(self.run.log)[DELAY], HELD_DEVIATION)
+        if size > _UNLIKELY:
+            found.append(delay_cause(float(delay), 0.5 * float(size) ** 2))
+        if DIRECTION in model.calibrated.values():
+            turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
+            size = abs(turn) / float(model.first_deviations()[DIRECTION])
+            if size > _UNLIKELY:
+                found.append(Cause(turn_text(Hypothesis(turn=-turn)), 0.5 * size**2, turn=abs(turn)))
+        return found
 
     def told_with(self, of_echoes: Sequence[Cause], of_beams: Sequence[Cause]) -> List[Cause]:
         """Return the causes with those that pairs of scans and beams show: those that the fit mends it tells better.

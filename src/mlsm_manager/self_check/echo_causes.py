@@ -47,7 +47,7 @@ def echo_findings(
     nats = pairs.evidence(best, honest) - np.log(tried)
     if nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if best.is_over else abs(best.turn)  # if it is the odometry, the path is mirrored
-        return EchoFindings([Cause(_turn_text(best), nats, turn=turn)], best)
+        return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
     found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, _NATS)]
     return EchoFindings(ranked(found), AS_TOLD)
 
@@ -65,7 +65,8 @@ def _turned(pairs: ScanPairs) -> Tuple[Hypothesis, int]:
     return pairs.best(around(coarse, "turn", coarse.turn + _FINE * np.arange(-4, 5))), len(tried)
 
 
-def _turn_text(found: Hypothesis) -> str:
+def turn_text(found: Hypothesis) -> str:
+    """Return what is said of a mount."""
     turn = (np.degrees(found.turn) + 180.0) % 360.0 - 180.0
     angle = f"turned by {turn:.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg against tf"
     if not found.is_over:
@@ -82,9 +83,14 @@ def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     nats = pairs.evidence(found, honest) - np.log(len(tried))
     if abs(found.delay) <= _DELAY_TOLD or nats < _NATS:
         return []
-    side = "later" if found.delay > 0.0 else "earlier"
-    text = f"beams were sent {abs(found.delay):.0f} s {side} than their stamps, by the odometry's clock"
-    return [Cause(text, nats, metres=1.0)]
+    return [delay_cause(found.delay, nats)]
+
+
+def delay_cause(delay: float, nats: float) -> Cause:
+    """Return the cause for beams that are `delay` [s] later than their stamps."""
+    side = "later" if delay > 0.0 else "earlier"
+    text = f"beams were sent {abs(delay):.0f} s {side} than their stamps, by the odometry's clock"
+    return Cause(text, nats, metres=1.0)
 
 
 def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
+from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
@@ -84,6 +85,7 @@ def test_a_current_moves_what_comes_after_it():
     [
         (broken.compass_drifts(WHOLE, 60.0, 6.0), "the compass drifts by +"),
         (broken.mount_turned(WHOLE, 12.0), "the sonar is turned by 1"),
+        (rare.odometry_late(WHOLE, 4.0), "beams were sent 4 s later than their stamps"),
     ],
 )
 def test_what_echoes_correct_is_named_first(recording, said):
