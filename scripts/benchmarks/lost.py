@@ -7,6 +7,7 @@ what is stated. After half of a tour some vehicles are where the map has nothing
 """
 
 from dataclasses import replace
+from functools import partial
 from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -50,10 +51,10 @@ class Start(NamedTuple):
         return self.scans is not None and self.error > max(_WRONG, _SURE * self.stated)
 
 
-def tour_case(name: str) -> Case:
-    """Return two runs of a simulated tour."""
+def tour_case(name: str, **errors: float) -> Case:
+    """Return two runs of a simulated tour, the second with `errors` of its odometry (see TwinParameters)."""
     first, second = simulated(name, seed=1), simulated(name, seed=2)
-    return Case(first.recording(first.truth), second.with_dvl(2), second.truth)
+    return Case(first.recording(first.truth), second.with_dvl(2, **errors), second.truth)
 
 
 def elsewhere(mapped: str, other: str) -> Case:
@@ -72,6 +73,7 @@ CASES = {
     "harbour": (tour_case, ("harbour_tour",), 1.0),
     "harbour, half of the tour": (tour_case, ("harbour_tour",), 0.5),
     "harbour ahead": (tour_case, ("harbour_ahead_tour",), 1.0),
+    "harbour ahead, odometry 30 % off": (partial(tour_case, scale=0.3), ("harbour_ahead_tour",), 1.0),
     "basin, vehicle in the harbour": (elsewhere, ("basin_tour", "harbour_tour"), 1.0),
     "harbour, vehicle in the basin": (elsewhere, ("harbour_tour", "basin_tour"), 1.0),
 }
@@ -80,7 +82,7 @@ CASES = {
 
 def stored_map(recording: Recording, share: float) -> Tuple[StoredMap, ReplayParameters]:
     """Return the map of the first `share` of a recording, and what it was made with."""
-    scans, parameters = replay_input(recording, OdometryKind.DVL)
+    scans, parameters = replay_input(recording, OdometryKind.AUTO)
     localiser = parameters.build_localiser(recording.sonar_in_base)
     for scan in scans[: int(share * len(scans))]:
         localiser.take_scan(scan)
@@ -103,7 +105,7 @@ def started(localiser: Localiser, scans: Iterable[Scan], truth: Track) -> Start:
 def starts(case: Case, share: float, count: int) -> List[Start]:
     """Return what came of `count` starts all along the other run."""
     stored, parameters = stored_map(case.mapped, share)
-    scans, _ = replay_input(case.other, OdometryKind.DVL)
+    scans, _ = replay_input(case.other, OdometryKind.AUTO)
     rng = np.random.RandomState(5)
     found = []
     for first in (np.linspace(0.0, 0.9, count) * len(scans)).astype(int):

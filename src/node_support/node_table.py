@@ -265,7 +265,7 @@ NODES: Dict[str, NodeDescription] = {
             _publishes(
                 "tf", "", "`map -> odom` at `transform_rate`; it changes smoothly to a new fix within `blend_time`"
             ),
-            _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scan"),
+            _serves("~relocalise", "std_srvs/Trigger", "searches the whole map for the newest scans"),
             _serves(topics.DYNAMIC_MAP, "nav_msgs/GetMap", "returns `map`"),
             _serves("~save_map", "SaveMap", "writes the map into `map_directory`"),
             _serves("~load_map", "LoadMap", "takes a map of `map_directory` in the place of the present one"),

@@ -2,9 +2,10 @@
 
 import threading
 import time as wall
+from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Callable, List, Mapping, Optional, Tuple
+from typing import Any, Callable, Deque, List, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -18,7 +19,6 @@ from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.scan_matching.distribution_matcher import relocalised
 from mlsm_manager.scan_matching.prediction import Belief
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
@@ -36,6 +36,7 @@ _LEAP = 600.0
 # s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
 # that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
+_NEWEST = 3  # scans in which a vehicle is searched on request; two must be found
 
 
 class MapInput(Enum):
@@ -78,7 +79,7 @@ class Localiser:
         self._changes = 0
         self.following = Following(limits, settings.blend_time, clock)
         """What is known between scans."""
-        self._newest: Optional[Scan] = None
+        self._newest: Deque[Scan] = deque(maxlen=_NEWEST)
         self._search = PlaceSearch()
         self._resumed_at: Optional[StoredPlace] = None
         self.origin: Optional[Origin] = None
@@ -141,7 +142,7 @@ class Localiser:
             self.notice_time(scan.reference_time)
             self._changes += 1
             reported, scan = scan, self.following.taken(scan)
-            self._newest = scan
+            self._newest.append(scan)
             update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
             self._search.learn(update.accepted)
             update = self.following.learned(scan, update, self.estimator.matching)
@@ -240,15 +241,16 @@ class Localiser:
             self.estimator.follow(self.following.followed(track, time), time)
 
     def relocalise(self) -> Optional[ScanUpdate]:
-        """Search the whole map for the newest scan, and take the place that is found as the vehicle's.
+        """Search the whole map for the newest scans, and take a place that two of them tell as the vehicle's.
 
         Return None when there is no scan yet.
         """
         with self._lock:
-            scan = self._newest
-            if scan is None:
+            if not self._newest:
                 return None
-            result = relocalised(scan, self.estimator.target, self._settings.anywhere, self.estimator.errors)
+            search, estimator = PlaceSearch(), self.estimator
+            for scan in self._newest:
+                result = search.found(scan, estimator.target, self._settings.anywhere, estimator.errors)
             update = self._adopted(scan, result)
             if update.accepted:
                 self._search.forget()
@@ -365,4 +367,5 @@ class Localiser:
 
     def _forget_scans(self) -> None:
         self.following.clear()
-        self._newest = self._resumed_at = None
+        self._newest.clear()
+        self._resumed_at = None

@@ -14,6 +14,7 @@ from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.geometry import wrapped
 
 _SURE = 3.0  # standard deviations by which two places of one vehicle may differ
+_SCALE = 0.3  # relative error of distances of an odometry of which no echo has told anything yet
 _FARTHEST = 10.0  # m: where the odometry since a scan is less sure, the next one confirms nothing
 _MOST_REJECTED = 3  # scans in a row that do not match show that the vehicle is elsewhere
 _UNCONFIRMED = "found in the whole map by this scan alone; the next one must be found where that leads to"
@@ -31,9 +32,11 @@ class FoundPlace:
         expected = carried_on(self.belief, self.T_odom_base, later.T_odom_base, later.belief.time, errors)
         difference = (later.belief.theta - expected.theta)[POSE]
         difference[YAW] = wrapped(difference[YAW])
-        covariance = (expected.covariance + later.belief.covariance)[POSE, POSE]
-        is_near = difference @ np.linalg.solve(covariance, difference) < _SURE**2
-        return bool(is_near and np.trace(expected.covariance[POSITION, POSITION]) < _FARTHEST**2)
+        distance = np.hypot(*(later.T_odom_base - self.T_odom_base)[:2])
+        covariance = expected.covariance[POSE, POSE] + (_SCALE * distance) ** 2 * np.diag([1.0, 1.0, 0.0])
+        is_known = np.trace(covariance[POSITION, POSITION]) < _FARTHEST**2
+        covariance += later.belief.covariance[POSE, POSE]
+        return bool(is_known and difference @ np.linalg.solve(covariance, difference) < _SURE**2)
 
 
 class PlaceSearch:

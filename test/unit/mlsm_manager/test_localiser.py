@@ -98,6 +98,13 @@ def test_relocalisation_finds_the_newest_scan_anywhere_in_the_map():
     np.testing.assert_allclose(update.result.pose, np.zeros(3), atol=0.05)
 
 
+def test_relocalisation_believes_no_scan_alone():
+    localiser, _ = localiser_after(1, estimator=EstimatorName.THESIS)
+    update = localiser.relocalise()
+    assert not update.accepted
+    assert "by this scan alone" in update.result.reason
+
+
 def test_relocalisation_without_a_scan_finds_nothing():
     assert localiser_after(0)[0].relocalise() is None
 
