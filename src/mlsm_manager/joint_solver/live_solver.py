@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_new
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.place_search import put_newest, silent_scans, submap_place
+from mlsm_manager.joint_solver.place_search import put_newest, put_submap, silent_scans
 from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog, stacked, unstacked
@@ -216,10 +216,8 @@ class LiveSolver:
             self._start_at(fix)
         window = self._fitted()
         if self.submaps.is_apart:
-            self.search = submap_place(self.solution, window.estimates(1)[0].covariance[:2, :2])
+            self.search = put_submap(self.solution, window.estimates(1)[0].covariance[:2, :2])
             if self.search.is_certain:
-                self.solution.move_newest(self.search.moves)
-                self.submaps.join()
                 window = self._fitted()
         self.closed = None
         if self._may_close:

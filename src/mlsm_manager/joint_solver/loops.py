@@ -15,7 +15,7 @@ from mlsm_manager.joint_solver.map_support import Surfaces
 from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, Freedom, PlaceCandidate, best_place
+from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, PlaceCandidate, best_place
 from mlsm_manager.joint_solver.solution import MAP, Solution
 
 APART = 20
@@ -108,7 +108,7 @@ def loop_of(sources: PlacedPoints, older: PlacedPoints, scan: int, parameters: S
     surfaces = Surfaces(targets, parameters)
     if not len(targets) or surfaces.shares(sources, sources.places[np.newaxis])[0] > 1.0 - _GAIN:
         return None
-    found = best_place(Freedom.as_one(_DRIFT**2 * np.eye(2), np.ones(1), 2), sources, surfaces)
+    found = best_place(_DRIFT**2 * np.eye(2), sources, surfaces)
     if not found.is_certain or found.fit < found.fit_before + _GAIN:
         return None
     distance = np.hypot(*(targets.places[:, np.newaxis] - sources.places - found.shift).transpose(2, 0, 1)).min(axis=1)

@@ -5,7 +5,7 @@ whole map, at the places that the motion since then allows; if the echoes do not
 not to know where the vehicle is.
 """
 
-from typing import List, NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -19,21 +19,17 @@ from mlsm_manager.joint_solver.places import (
     MOST_POINTS,
     POINT_WEIGHT,
     REACH,
-    Freedom,
     PlaceCandidate,
     best_place,
-    moved,
     places_within,
+    widest,
 )
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import MAP, Solution
-from node_support.geometry import grid
 
 _KNOWN = 2.0  # deviations of the motion within the cut, and the solver's own steps do
 _SUBMAP_SCANS = 6  # the newest ones of a submap that are looked for: older ones may lie in water that the map has not
 _SUBMAP_POINTS = 400  # of these
-_MOTIONS = np.linspace(-2.0, 2.0, 5)  # standard deviations of the motion within the newest scan, in each direction
-_ROUNDING = 1e-6  # m^2, keeps a motion that is known from having no variance
 _MOST_CELLS = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
 _COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
 _POST_WEIGHT = 1.0  # log-likelihood of a point that stands alone where another one stood: there are few
@@ -52,7 +48,7 @@ def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optio
     covariance = covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
     found = place_after_silence(solution, covariance, silent) if silent else None
     if found is not None and found.is_certain and not solution.submaps.is_apart:
-        solution.move_newest(found.moves)
+        solution.move_newest(_shares_of_move(solution.log, solution.log.scan_count - 1), found.shift)
     elif found is not None and found.reach > solution.parameters.wide_cut:
         solution.submaps.begin()
     else:
@@ -71,7 +67,7 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     last = log.scan_count
     nodes = np.array([last - 1, last])
     step = Transition.of(solution.odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
-    if _KNOWN * np.sqrt(np.linalg.eigvalsh(step[:2, :2])[-1]) < solution.parameters.cut:
+    if _KNOWN * widest(step[:2, :2]) < solution.parameters.cut:
         return newest
     before, own = log.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
     if not len(before) or not len(own):
@@ -95,27 +91,32 @@ def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int)
     """
     log, parameters = solution.log, solution.parameters
     last = log.scan_count
-    motion = _freedom_since(solution, covariance, silent)
-    own = log.rows(last - 1, last)
-    if motion.reach * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
+    own, place = log.rows(last - 1, last), _covariance_since(solution, covariance, silent)[:2, :2]
+    if widest(place) * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
         return None
-    sources = solution.placed(own[:: max(1, len(own) // MOST_POINTS)])
-    targets = _map_around(solution, sources, REACH * motion.reach + parameters.cut)
-    return best_place(motion, sources, Surfaces(targets, parameters))
+    return _best_place(solution, own[:: max(1, len(own) // MOST_POINTS)], place)
 
 
-def submap_place(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
-    """Return where the newest scans, which lie apart from the map, are in it; covariance: (2, 2) m^2 of the place.
+def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
+    """Put the newest scans, which lie apart from the map, into it if they fit at one place; return what was found.
 
-    They are moved together, with the nodes of the silence before them in part.
+    They are moved together, with the nodes of the silence before them in part. covariance: (2, 2) m^2 of the place.
     """
-    log, parameters = solution.log, solution.parameters
+    log = solution.log
     last, first = log.scan_count, solution.submaps.start
     rows = log.rows(max(first, last - _SUBMAP_SCANS), last)
-    sources = solution.placed(rows[:: max(1, len(rows) // _SUBMAP_POINTS)])
-    freedom = Freedom.as_one(covariance, _shares_of_move(log, first), solution.odometry.width)
-    targets = _map_around(solution, sources, REACH * freedom.reach + parameters.cut)
-    return best_place(freedom, sources, Surfaces(targets, parameters))
+    found = _best_place(solution, rows[:: max(1, len(rows) // _SUBMAP_POINTS)], covariance)
+    if found.is_certain:
+        solution.move_newest(_shares_of_move(log, first), found.shift)
+        solution.submaps.join()
+    return found
+
+
+def _best_place(solution: Solution, rows: np.ndarray, covariance: np.ndarray) -> PlaceCandidate:
+    """Return where in the map the points in `rows` fit best."""
+    sources = solution.placed(rows)
+    targets = _map_around(solution, sources, REACH * widest(covariance) + solution.parameters.cut)
+    return best_place(covariance, sources, Surfaces(targets, solution.parameters))
 
 
 class _Search(NamedTuple):
@@ -133,11 +134,10 @@ class _Search(NamedTuple):
         solution, parameters = self.solution.with_state(state), self.solution.parameters
         sources = solution.placed(self.own[:: max(1, len(self.own) // most)])
         shifts = places_within(step[:2, :2], _MOST_CELLS)
-        ends = np.column_stack([np.zeros_like(shifts), shifts])
-        support = self.surfaces.support(sources, moved(sources, ends))
+        support = self.surfaces.support(sources, _with_ends_moved(sources, shifts))
         found = POINT_WEIGHT * MOST_POINTS / most * support
         if parameters.post_confidence:
-            found = found + parameters.post_confidence * _POST_WEIGHT * _post_support(solution, ends)
+            found = found + parameters.post_confidence * _POST_WEIGHT * _post_support(solution, shifts)
         costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
         best = np.argmax(found - costs)
         node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])
@@ -159,57 +159,35 @@ class _Search(NamedTuple):
         return states[int(np.argmax(scores))], left
 
 
-def _post_support(solution: Solution, ends: np.ndarray) -> np.ndarray:
-    """Return how many of the newest scan's echoes of posts (k,) lie on earlier ones at `ends` (k, 4); see moved."""
+def _with_ends_moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
+    """Return the places (k, n, 2) of points whose scan ends `shifts` (k, 2) beside where it does, and begins there."""
+    return sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
+
+
+def _post_support(solution: Solution, shifts: np.ndarray) -> np.ndarray:
+    """Return how many of the newest scan's echoes of posts (k,) lie on earlier ones; see _with_ends_moved."""
     last, rows = solution.log.scan_count, solution.log.posts.rows
     sources = solution.placed_posts(rows(last - 1, last))
     targets = solution.placed_posts(rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
     if not len(sources) or not len(targets):
-        return np.zeros(len(ends))
-    places = moved(sources, ends)
+        return np.zeros(len(shifts))
+    places = _with_ends_moved(sources, shifts)
     distance, _ = cKDTree(targets.places).query(places.reshape(-1, 2), distance_upper_bound=solution.parameters.cut)
     return (nearness(distance).reshape(places.shape[:2]) * sources.qualities).sum(axis=1)
 
 
-def _freedom_since(solution: Solution, covariance: np.ndarray, silent: int) -> Freedom:
-    """Return what is known of the newest nodes as seen from the one before `silent` scans and the newest one.
+def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -> np.ndarray:
+    """Return that of the newest node (width, width) as seen from the one before `silent` scans and the newest one.
 
-    covariance: (width, width) of that node. Beginning and end of the newest scan matter most: with both given, what is
-    expected of all other nodes follows.
+    covariance: (width, width) of that node.
     """
-    log, odometry, nodes = solution.log, solution.odometry, solution.state.nodes
-    last, width = log.scan_count, odometry.width
-    steps = [
-        Transition.of(odometry, nodes[node : node + 2], log.node_motion(np.array([node, node + 1])))
-        for node in range(last - 1 - silent, last)
-    ]
-    joint = _joint_covariance(steps, covariance)
-    end = width * (len(steps) - 1) + np.arange(2)
-    start = end - width
-    ends, of_end = np.append(start, end), joint[np.ix_(end, end)]
-    information = np.linalg.inv(joint[np.ix_(ends, ends)])
-    along = joint[np.ix_(start, end)] @ np.linalg.inv(of_end)
-    beside = joint[np.ix_(start, start)] - along @ joint[np.ix_(end, start)]
-    motions = grid(_MOTIONS)
-    motions = motions[np.hypot(*motions.T) <= _MOTIONS.max()]
-    tried = motions @ np.linalg.cholesky(beside + _ROUNDING * np.eye(2)).T
-    return Freedom(of_end, information, along, tried, (joint[:, ends] @ information).reshape(-1, width, 4))
-
-
-def _joint_covariance(steps: List[Transition], covariance: np.ndarray) -> np.ndarray:
-    """Return that of the nodes (n width, n width) after n `steps` from a node whose pose is taken as known."""
-    width = len(covariance)
-    joint = np.zeros((len(steps) * width,) * 2)
-    own = covariance.copy()
+    log, nodes, own = solution.log, solution.state.nodes, covariance.copy()
     own[POSE] = own[:, POSE] = 0.0
-    for number, step in enumerate(steps):
-        before, here = slice(0, number * width), slice(number * width, (number + 1) * width)
-        if number:
-            joint[here, before] = step.matrix @ joint[(number - 1) * width : number * width, before]
-            joint[before, here] = joint[here, before].T
+    for node in range(log.scan_count - 1 - silent, log.scan_count):
+        motion = log.node_motion(np.array([node, node + 1]))
+        step = Transition.of(solution.odometry, nodes[node : node + 2], motion)
         own = step.matrix @ own @ step.matrix.T + step.noise
-        joint[here, here] = own
-    return joint
+    return own
 
 
 def _silent_before(log: RunLog, scan: int) -> int:
@@ -223,8 +201,8 @@ def _silent_before(log: RunLog, scan: int) -> int:
 def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
     """Return what share (k,) of their move the newest nodes go with the scans from `first` on: in a silence a part."""
     silent = _silent_before(log, first)
-    times = log.node_times[first - silent : first + 1]
-    return np.append((times[1:] - times[0]) / (times[-1] - times[0]), np.ones(log.scan_count - first + 1))
+    times = log.node_times[first - silent :]
+    return np.minimum((times[1:] - times[0]) / (times[silent] - times[0]), 1.0)
 
 
 def _map_around(solution: Solution, sources: PlacedPoints, reach: float) -> PlacedPoints:

@@ -1,7 +1,7 @@
 """One search over places, for all who ask where scans lie on what other scans heard (correlative search, Olson 2009).
 
-Every place within reach is tried with few points, the best ones again with all, a little aside and with other motions
-within the scan. A place is certain if the points fit there, and at no other place nearly as well.
+Every place within reach is tried with few points, the best ones again with all and a little aside. A place is certain
+if the points fit there, and at no other place nearly as well.
 """
 
 from dataclasses import dataclass
@@ -32,51 +32,13 @@ _LEAD = 0.1  # by which that share must exceed the one at any other place
 
 
 @dataclass(frozen=True)
-class Freedom:
-    """Where the newest nodes may be, as far as motion and earlier scans tell it.
-
-    of_place: (2, 2) m^2, covariance of where the newest scans end. information: (4, 4) 1/m^2 of where they begin and
-    end. along: (2, 2) expected move of their beginning by that of their end. beside: (k, 2) m, moves of the beginning
-    besides, that are to be tried. of_nodes: (n, width, 4) moves of the newest nodes by those of beginning and end.
-    """
-
-    of_place: np.ndarray
-    information: np.ndarray
-    along: np.ndarray
-    beside: np.ndarray
-    of_nodes: np.ndarray
-
-    @classmethod
-    def as_one(cls, of_place: np.ndarray, shares: np.ndarray, width: int) -> "Freedom":
-        """Return that of scans that move as one, and the newest nodes with them by `shares` (n,) of it."""
-        information, of_nodes = np.zeros((4, 4)), np.zeros((len(shares), width, 4))
-        information[2:, 2:] = np.linalg.inv(of_place)
-        of_nodes[:, 0, 2] = of_nodes[:, 1, 3] = shares
-        return cls(of_place, information, np.eye(2), np.zeros((1, 2)), of_nodes)
-
-    @property
-    def reach(self) -> float:
-        """Largest deviation of the place, m."""
-        return float(np.sqrt(np.linalg.eigvalsh(self.of_place)[-1]))
-
-    def ends(self, shifts: np.ndarray) -> np.ndarray:
-        """Return the moves (k, 4) [m] of beginning and end that are expected if the end moves by (k, 2)."""
-        return np.column_stack([shifts @ self.along.T, shifts])
-
-    def cost(self, ends: np.ndarray) -> float:
-        """Return the negative log-likelihood of moves (4,) of beginning and end."""
-        return 0.5 * float(ends @ self.information @ ends)
-
-
-@dataclass(frozen=True)
 class PlaceCandidate:
-    """The best place that a search found. moves: (k, width) of the newest nodes to it.
+    """The best place that a search found.
 
     shift: (2,) m from the expected place. fit, fit_before, elsewhere: shares of the points on surfaces there, at the
     expected place, and at the best other one. reach: m, deviation of the place.
     """
 
-    moves: np.ndarray
     shift: np.ndarray
     fit: float
     fit_before: float
@@ -96,21 +58,28 @@ class PlaceCandidate:
         )
 
 
-def best_place(freedom: Freedom, sources: PlacedPoints, surfaces: Surfaces) -> PlaceCandidate:
-    """Return where `sources` fit best to `surfaces`; nowhere, with a fit of 0, where there are none of either."""
+def best_place(covariance: np.ndarray, sources: PlacedPoints, surfaces: Surfaces) -> PlaceCandidate:
+    """Return where `sources`, moved as one, fit best to `surfaces`; nowhere, with a fit of 0, without either.
+
+    covariance: (2, 2) m^2, of their place.
+    """
+    reach = widest(covariance)
     if not len(sources) or not len(surfaces.points):
-        return PlaceCandidate(freedom.of_nodes[:0, :, 0], np.zeros(2), 0.0, 0.0, 0.0, freedom.reach)
-    shifts = places_within(freedom.of_place, _MOST_CELLS)
+        return PlaceCandidate(np.zeros(2), 0.0, 0.0, 0.0, reach)
+    shifts = places_within(covariance, _MOST_CELLS)
     few = sources.selected(np.arange(0, len(sources), max(1, len(sources) // _FEW_POINTS)))
-    shares = surfaces.shares(few, moved(few, freedom.ends(shifts)))
-    found = [_refined(freedom, sources, surfaces, shift) for shift in _best_of(shifts, shares)]
-    total = sources.qualities.sum()
-    best = int(np.argmax([POINT_WEIGHT * share * total - freedom.cost(ends) for ends, share in found]))
-    ends, fit = found[best]
-    others = [share for other, share in found if np.hypot(*(other - ends)[2:]) > _OTHER]
-    return PlaceCandidate(
-        freedom.of_nodes @ ends, ends[2:], fit, float(shares[0]), max(others, default=0.0), freedom.reach
-    )
+    shares = surfaces.shares(few, _moved(few, shifts))
+    found = [_refined(sources, surfaces, shift) for shift in _best_of(shifts, shares)]
+    total, information = sources.qualities.sum(), np.linalg.inv(covariance)
+    likelihoods = [POINT_WEIGHT * share * total - 0.5 * shift @ information @ shift for shift, share in found]
+    best, fit = found[int(np.argmax(likelihoods))]
+    others = [share for shift, share in found if np.hypot(*(shift - best)) > _OTHER]
+    return PlaceCandidate(best, fit, float(shares[0]), max(others, default=0.0), reach)
+
+
+def widest(covariance: np.ndarray) -> float:
+    """Return the largest deviation [m] of a place with a covariance (2, 2) [m^2]."""
+    return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
 
 
 def places_within(covariance: np.ndarray, most: int) -> np.ndarray:
@@ -126,10 +95,8 @@ def places_within(covariance: np.ndarray, most: int) -> np.ndarray:
     return np.concatenate([np.zeros((1, 2)), shifts[distance <= REACH**2]])
 
 
-def moved(sources: PlacedPoints, ends: np.ndarray) -> np.ndarray:
-    """Return the places (k, n, 2) of points whose scan begins and ends `ends` (k, 4) beside where they are."""
-    share = sources.shares[:, np.newaxis]
-    return sources.places + (1.0 - share) * ends[:, np.newaxis, :2] + share * ends[:, np.newaxis, 2:]
+def _moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
+    return sources.places + shifts[:, np.newaxis]
 
 
 def _best_of(shifts: np.ndarray, shares: np.ndarray) -> List[np.ndarray]:
@@ -143,13 +110,9 @@ def _best_of(shifts: np.ndarray, shares: np.ndarray) -> List[np.ndarray]:
     return found
 
 
-def _refined(
-    freedom: Freedom, sources: PlacedPoints, surfaces: Surfaces, shift: np.ndarray
-) -> Tuple[np.ndarray, float]:
-    """Return the best moves (4,) of beginning and end of the scans about a shift (2,) of both, and the share there."""
+def _refined(sources: PlacedPoints, surfaces: Surfaces, shift: np.ndarray) -> Tuple[np.ndarray, float]:
+    """Return the best shift (2,) of the scans about one, and the share there."""
     shifts = shift + grid(_ASIDE)
-    ends = np.repeat(freedom.ends(shifts), len(freedom.beside), axis=0)
-    ends[:, :2] += np.tile(freedom.beside, (len(shifts), 1))
-    shares = surfaces.shares(sources, moved(sources, ends))
+    shares = surfaces.shares(sources, _moved(sources, shifts))
     best = int(np.argmax(shares))
-    return ends[best], float(shares[best])
+    return shifts[best], float(shares[best])

@@ -174,9 +174,9 @@ class Solution:
         """Return the run with other unknowns."""
         return replace(self, state=state)
 
-    def move_newest(self, moves: np.ndarray) -> None:
-        """Move the newest nodes by `moves` (k, width)."""
-        self.state.nodes[-len(moves) :] += moves
+    def move_newest(self, shares: np.ndarray, shift: np.ndarray) -> None:
+        """Move the newest nodes by `shares` (k,) of a shift (2,) m."""
+        self.state.nodes[-len(shares) :, :2] += np.outer(shares, shift)
 
     def placed(self, rows: np.ndarray) -> PlacedPoints:
         """Return the surface points in `rows` (n,) int of the log in the map."""

@@ -90,7 +90,7 @@ def test_a_canal_makes_no_loops():
 
 def test_a_loop_that_other_scans_do_not_confirm_is_none():
     def loop(scan, x):
-        place = PlaceCandidate(np.zeros((1, 2)), np.array([x, 0.0]), fit=0.9, fit_before=0.1, elsewhere=0.5, reach=5.0)
+        place = PlaceCandidate(np.array([x, 0.0]), fit=0.9, fit_before=0.1, elsewhere=0.5, reach=5.0)
         return Loop(scan, 1, place)
 
     alike = [loop(30, 8.0), loop(31, 9.0), loop(33, 8.0)]

@@ -73,7 +73,7 @@ def test_a_resumed_run_closes_no_loop_since_the_map_stored_with_it_would_stay_be
 
 def bend_of(variances, older):
     """Return the bend of a path whose nodes have places with these variances [m^2], by 4 m along x."""
-    place = PlaceCandidate(np.zeros((1, 2)), np.array([4.0, 0.0]), fit=0.9, fit_before=0.1, elsewhere=0.5, reach=5.0)
+    place = PlaceCandidate(np.array([4.0, 0.0]), fit=0.9, fit_before=0.1, elsewhere=0.5, reach=5.0)
     start = State(np.zeros((len(variances), 3)), np.zeros(2))
     covariances = 0.5 * np.array(variances)[:, np.newaxis, np.newaxis] * np.eye(2)
     return Bend.of([Loop(len(variances), older - 1, place)], start, covariances)
