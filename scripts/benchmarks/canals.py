@@ -66,18 +66,26 @@ def made_path(rng: np.random.RandomState) -> Track:
 
 def recording(posts: int, seed: int, binary: bool) -> Tuple[Recording, Track]:
     """Return what a vehicle with a compass and a scanning sonar records, and its true path."""
-    rng, conditions = np.random.RandomState(seed), TwinParameters(range_scale=0.0, delay=0.0, binary=binary)
+    rng = np.random.RandomState(seed)
     water, truth = made_canal(posts, rng), made_path(rng)
+    return recorded_along(truth, water, binary, rng, np.array([0.0, 0.0, 1.0])), truth
+
+
+def recorded_along(
+    truth: Track, water: Water, binary: bool, rng: np.random.RandomState, known: np.ndarray
+) -> Recording:  # fmt: skip
+    """Return what is recorded along a path; known: (3,) 0 for what is not reported of x, y and yaw, else 1."""
+    conditions = TwinParameters(range_scale=0.0, delay=0.0, binary=binary)
     stamps = np.arange(truth.times[0], truth.times[-1] - 2.0, _BEAM_SECONDS)
     bearings = np.angle(np.exp(1j * _BEAM_ANGLE * np.arange(len(stamps))))
     strengths = heard(water, truth.at(stamps), bearings, np.zeros(2), conditions, rng)
-    compass = Track(truth.times, reported(truth, conditions, rng).poses * [0.0, 0.0, 1.0])
-    places = matrices(compass.at(stamps))
+    track = Track(truth.times, reported(truth, conditions, rng).poses * known)
+    places = matrices(track.at(stamps))
     beams = [
         PlacedBeam(Beam(round(1e9 * time), "sonar", bearing, row, _BIN), place, True)
         for time, bearing, row, place in zip(stamps, bearings, strengths, places)
     ]
-    return Recording(beams, 0, compass, None), truth
+    return Recording(beams, 0, track, None)
 
 
 def main() -> None:
