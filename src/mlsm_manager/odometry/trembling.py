@@ -10,6 +10,7 @@ from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Track
 
 _TREMBLES = np.array([0.1, 0.1, np.radians(2.0)])  # m, rad: of a pose by itself; DVLs and compasses have a tenth of it
+_MOST = 20.0  # m, rad: beyond, poses do not tremble but make no sense
 _POSES = 100  # that tell it
 _OPPOSED = 0.6  # share of neighbours on opposite sides of a smooth path: .73 by noise, half in waves and turns
 _STEADY = 1e-3  # m, rad: noise of poses that do not tremble
@@ -22,7 +23,7 @@ def with_trembling_smoothed(track: Track) -> Tuple[Track, List[Step]]:
     where nowhere.
     """
     poses, noise = track.poses.copy(), np.column_stack([_noise(track.times, column) for column in track.poses.T])
-    trembles = noise > _TREMBLES
+    trembles = (noise > _TREMBLES) & (noise < _MOST)
     for axis in np.flatnonzero(trembles.any(axis=0)):
         own = trembles[:, axis]
         smoothed = _smoothed(track.times, poses[:, axis], np.where(own, noise[:, axis], _STEADY), _AGILITY[axis])
