@@ -15,7 +15,7 @@ from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, fit_wi
 from mlsm_manager.odometry.faults import FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, Fault
-from mlsm_manager.self_check.course import course_causes, course_of
+from mlsm_manager.self_check.course import LARGEST, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
 from node_support.geometry import composed, inverse, rotated, transformed
@@ -59,7 +59,9 @@ class MotionFindings:
 
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount."""
-        course, places = course_of(path), _places(self.run)
+        # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
+        alone = np.isinf(self.run.odometry.distance_deviation)
+        course, places = course_of(path, np.pi if alone else LARGEST), _places(self.run)
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
         turned = course_causes(course) or self._calibration_causes()

@@ -13,7 +13,7 @@ _FEWEST = 10  # stretches
 _AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
 _STRAFES = np.radians(20.0)  # deviation of the course, beyond which the vehicle has no usual one; ahead: 5 to 13 deg
 _NAMED = 2.0  # deviations
-_LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes back
+LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes back
 
 
 class CourseFound(NamedTuple):
@@ -31,8 +31,10 @@ class CourseFound(NamedTuple):
 NOT_TOLD = CourseFound(0.0, np.inf)
 
 
-def course_of(path: Track) -> CourseFound:
+def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     """Return what a path T_map_base tells of the sonar's turn, if the vehicle usually goes ahead; needs the past only.
+
+    largest: rad, beyond which it tells nothing.
 
     Echoes tell the motion against the sonar. A vehicle that seems to go to the right, however its odometry's own
     sensor is mounted, has a sonar that is turned to the left.
@@ -44,9 +46,10 @@ def course_of(path: Track) -> CourseFound:
     if len(moves) < _FEWEST:
         return NOT_TOLD
     angles = np.arctan2(moves[:, 1], moves[:, 0])
-    middle = float(np.median(angles))
+    middle = float(np.angle(np.exp(1j * angles).sum()))
+    middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
-    if spread > _STRAFES or abs(middle) > _LARGEST:
+    if spread > _STRAFES or abs(middle) > largest:
         return NOT_TOLD
     return CourseFound(-middle, float(np.hypot(1.25 * spread / np.sqrt(len(angles)), _AHEAD)))
 

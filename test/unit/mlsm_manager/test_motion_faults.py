@@ -96,12 +96,17 @@ def test_nothing_is_named_where_nothing_is_wrong():
     assert mapped(WHOLE).findings.trust.causes == []
 
 
-@pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1)])
+@pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1), (90.0, 1), (-179.0, 1)])
 def test_a_sonar_is_turned_where_the_vehicle_never_goes_ahead(turn, named):
     poses = WHOLE.track.poses + np.radians([0.0, 0.0, turn])
-    found = course_of(Track(WHOLE.track.times, poses))
+    found = course_of(Track(WHOLE.track.times, poses), np.pi)
     assert np.degrees(found.turn) == pytest.approx(turn, abs=1.0)
     assert len(course_causes(found)) == named
+
+
+def test_a_vehicle_that_goes_back_tells_nothing_of_the_mount_where_its_odometry_does():
+    path = Track(WHOLE.track.times, WHOLE.track.poses + np.radians([0.0, 0.0, 180.0]))
+    assert course_causes(course_of(path)) == []
 
 
 def test_a_vehicle_that_strafes_tells_nothing_of_the_mount():
