@@ -54,8 +54,8 @@ class StepKind(Enum):
 
 
 _LONGEST_STALLS = {StepKind.STALLED: 10.0, StepKind.POSITIONS: 30.0}
-"""s of equal poses, of which longer ones may be a vehicle that stands; and of equal positions beside a heading that is
-measured, while which a vehicle may go on as before.
+"""s. Poses that are equal for longer may be those of a vehicle that stands; and a vehicle whose positions are equal for
+longer, while its heading is measured, may have done anything.
 """
 
 
