@@ -23,6 +23,8 @@ from sonar_driver.port import LineParameters, Port, PortUnavailableError, is_dat
 
 _GREETINGS = 3
 _ANSWER_TIME = 0.3  # s: a head at rest answers within a few milliseconds; one that scans, between two beams
+_CLOCK_TOLERANCE = 1e-3  # s: a vehicle goes a millimetre in it
+_CLOCK_READINGS = 5
 
 
 @dataclass(frozen=True)
@@ -131,7 +133,19 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         if outcome.beam is None:
             return None
         self._note(pulse=outcome.beam.pulse)
-        return Ping(self._clock() - (self.elapsed() - outcome.pinged), outcome.beam)
+        return Ping(self._stamp(outcome.pinged), outcome.beam)
+
+    def _stamp(self, moment: float) -> float:
+        """Return what the clock of stamps said at a moment of the line's clock.
+
+        A process that was interrupted between the two clocks reads them again.
+        """
+        for _ in range(_CLOCK_READINGS):
+            before = self.elapsed()
+            stamp = self._clock()
+            if self.elapsed() - before < _CLOCK_TOLERANCE:
+                break
+        return stamp - (before - moment)
 
     def _scan(self, command: ScanCommand) -> Union[AutoScan, RequestScan]:
         by_itself = command.can_auto_transmit and self._information.can_auto_transmit and not self._auto.refused

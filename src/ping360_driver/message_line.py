@@ -1,5 +1,6 @@
 """Messages on an open port, each with the time at which its first byte left the head."""
 
+import math
 import threading
 import time
 from collections import deque
@@ -7,6 +8,7 @@ from dataclasses import dataclass
 from typing import Callable, Deque, List, Optional, Tuple
 
 from ping360_driver.messages import MessageStream, ParsedMessage, PingMessage
+from ping360_driver.scan_command import listening_time
 from sonar_driver.port import Port, transmission_time
 
 # After a break the head measures the speed of the line by this letter: as many ones as zeros, in turn (brping).
@@ -113,12 +115,27 @@ class MessageLine:
             self._stream.reset()
 
     def _arrivals(self, found: List[ParsedMessage]) -> List[Arrival]:
-        arrivals = [Arrival(self._begun(one), one.frame, one.message) for one in found]
+        arrivals: List[Arrival] = []
+        for one in reversed(found):
+            begun = min(self._begun(one), self._latest_begun(one, arrivals))
+            arrivals.append(Arrival(begun, one.frame, one.message))
         if found:
             end = found[-1].offset + len(found[-1].frame)
             while self._reads and self._reads[0][0] <= end:
                 self._reads.popleft()
-        return arrivals
+        return arrivals[::-1]
+
+    def _latest_begun(self, parsed: ParsedMessage, later: List[Arrival]) -> float:
+        """Return when a message can have begun at the latest: the head listens before it sends the one after it.
+
+        Both have come in one read where this process stalled. `later` are the messages after it, the newest first.
+        """
+        if not later:
+            return math.inf
+        following = later[-1]
+        is_copy = following.frame == parsed.frame
+        silent = 0.0 if is_copy else listening_time(following.message)
+        return following.begun - silent - transmission_time(len(parsed.frame), self._baud_rate)
 
     def _begun(self, parsed: ParsedMessage) -> float:
         """Return the latest time that every read allows: bytes cannot be read before they have been sent."""

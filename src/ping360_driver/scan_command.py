@@ -224,6 +224,11 @@ def beam(message: PingMessage) -> Beam:
     return Beam(message.angle, pulse, echoes, sector)
 
 
+def listening_time(message: PingMessage) -> float:
+    """Return how long the head listened before it sent a message, in seconds; 0 for one that is no beam."""
+    return getattr(message, "number_of_samples", 0) * getattr(message, "sample_period", 0) * TICK
+
+
 def device_information(message: PingMessage) -> DeviceInformation:
     """Return what a DEVICE_INFORMATION message says."""
     return DeviceInformation(

@@ -107,6 +107,36 @@ def test_stamps_are_when_the_pings_left(port, settings, max_range):
     assert [ping.stamp for ping in scan.pings] == pytest.approx(EPOCH + np.array(scan.echoes.times[:20]), abs=1e-4)
 
 
+def test_beams_that_came_while_the_driver_was_starved_of_time_are_stamped_one_after_the_other(port):
+    scan = VirtualScan(PING360, port)
+    starved = 0.0213
+    for _ in range(10):
+        scan.beams(3)
+        scan.time.now += starved
+    scan.beams(10)
+    times = EPOCH + np.array(scan.echoes.times[: len(scan.pings)])
+    assert np.all(np.diff([ping.stamp for ping in scan.pings]) > 0.0)
+    assert np.all(np.abs([ping.stamp for ping in scan.pings] - times) <= starved)
+
+
+class InterruptedScan(VirtualScan):
+    """A scan whose driver is interrupted before every other time at which it reads the clock of stamps."""
+
+    readings = 0
+
+    def clock(self):
+        self.readings += 1
+        self.time.now += 0.003 * (self.readings % 2)
+        return super().clock()
+
+
+def test_a_driver_that_is_interrupted_while_it_reads_its_clocks_stamps_its_beams_right(port):
+    scan = InterruptedScan(PING360, port)
+    scan.beams(20)
+    assert scan.readings == 40
+    assert [ping.stamp for ping in scan.pings] == pytest.approx(EPOCH + np.array(scan.echoes.times[:20]), abs=1e-4)
+
+
 def test_a_late_reply_is_not_taken_for_the_answer_to_the_next_request(port):
     faults = FaultInjector(EmulatorParameters(lateness=0.4))
     scan = VirtualScan(PING360_REQUESTS, port, faults=faults)

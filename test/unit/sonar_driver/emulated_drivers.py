@@ -224,8 +224,12 @@ class VirtualScan:
         self.head = sonar.emulated(connection, faults, self.echoes, head)
         baud_rate = math.inf if is_datagram_port(port) else connection.baud_rate
         line = VirtualLine(self.head, baud_rate, stop.time)
-        self.device = sonar.device(connection, stop, lambda: EPOCH + stop.time.now, stop.time.elapsed, line.open)
+        self.device = sonar.device(connection, stop, self.clock, stop.time.elapsed, line.open)
         self.device.open()
+
+    def clock(self):
+        """Return the time that stamps tell, s."""
+        return EPOCH + self.time.now
 
     def scan(self):
         """Ping as a scanner does, until the stop event is set."""
