@@ -30,6 +30,7 @@ STUDIES = (
     "heads",
     "honest",
     "link",
+    "live_faults",
     "logs",
     "long_run",
     "lost",

@@ -1,8 +1,7 @@
 """Prints which causes are named where nothing is broken: none is wanted.
 
-Each recording is mapped as `map_bag RECORDING --refine` does it. "live": what mlsm_core would have said meanwhile, with
-a look at the newest scans after each third one. The odometry of simulated tours has the usual errors of a DVL and a
-compass, drawn with the seed, or more of one kind.
+Each recording is mapped as `map_bag RECORDING --refine` does it. "live": what mlsm_core would have said meanwhile. The
+odometry of simulated tours has the usual errors of a DVL and a compass, drawn with the seed, or more of one kind.
 """
 
 import re
@@ -13,10 +12,12 @@ from typing import Callable, Dict, List, Set
 
 from benchmarks.faults import map_bag_options, shortened
 from benchmarks.harness import benchmark_parser, recorded
+from benchmarks.live_faults import told_by
 from benchmarks.tours import simulated
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
 from mlsm_manager.offline.recording import Recording, read_recording
-from mlsm_manager.self_check.live_causes import LiveCauses
+from mlsm_manager.offline.replay import ReplayParameters
 from recordings.bags.bag import RecordingError
 from recordings.reader import Request
 
@@ -51,17 +52,10 @@ def _drawn(tour: str, seed: int, errors: Dict[str, float]) -> Recording:
     return simulated(f"{tour}_tour").with_dvl(seed, **errors)
 
 
-def live_causes(mapped: MappedBag) -> Set[str]:
-    """Return what is said while the run goes on."""
-    live, said = LiveCauses(), set()
-    live.sonar_in_base = mapped.recording.sonar_in_base
-    for update in mapped.replayed.updates:
-        if update.belief is None:
-            return set()
-        live.take(update.scan, update.belief.theta[:3])
-        live.look()
-        said |= {cause.text for cause in live.causes([])}
-    return said
+def live_causes(recording: Recording, kind: OdometryKind) -> Set[str]:
+    """Return what is said while the run goes on, to whom the kind of the odometry is told."""
+    parameters = ReplayParameters().changed(profile_values(kind))
+    return {text for told in told_by(recording, parameters) for text in told.causes}
 
 
 def offline_causes(mapped: MappedBag) -> Set[str]:
@@ -88,11 +82,12 @@ def main() -> None:
 def _said(name: str, made: Callable[[], Recording], seconds: float, options: Namespace) -> List[Set[str]]:
     """Print and return what is said of the first seconds of a recording, offline and live."""
     try:
-        mapped = mapped_bag(shortened(made(), seconds), options)
+        recording = shortened(made(), seconds)
+        mapped = mapped_bag(recording, options)
+        said = [offline_causes(mapped), live_causes(recording, mapped.odometry.kind)]
     except RecordingError as refused:
         print(f"{name:50} refused: {refused}", flush=True)
         return [set(), set()]
-    said = [offline_causes(mapped), live_causes(mapped)]
     print(
         f"{name:50} offline: {'; '.join(sorted(said[0])) or '-'}   live: {'; '.join(sorted(said[1])) or '-'}",
         flush=True,

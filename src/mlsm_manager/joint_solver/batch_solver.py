@@ -24,7 +24,7 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.post_comparisons import PostComparisons
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian
-from mlsm_manager.joint_solver.solution import Solution, Submaps
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.velocity_models import by_heading
 from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
@@ -148,12 +148,9 @@ def solved_part(live: LiveSolver, first: int) -> PartResult:
 
     What `live` found is where the fit begins, but no belief of it.
     """
-    state = State(live.state.nodes[first:].copy(), live.state.run.copy())
-    state.nodes[:, :2] -= state.nodes[0, :2]
-    submaps = Submaps(live.submaps.numbers[first:])
-    problem = _Batch(Solution(live.log.since(first), live.parameters, state, submaps))
+    problem = _Batch(live.solution.since(first))
     steps, _ = problem.converge()
-    return PartResult(state.nodes[-1].copy(), state.run.copy(), problem.newest_covariance(), steps)
+    return PartResult(problem.state.nodes[-1].copy(), problem.state.run.copy(), problem.newest_covariance(), steps)
 
 
 def _misfit(run: Solution) -> np.ndarray:

@@ -188,6 +188,11 @@ class OdometryLog:
         near = _around(self._table["times"], start, end)
         return Motion(*self._table.chosen(near, "times", "poses", "ahead", "held"))
 
+    def track_from(self, start: float) -> Track:
+        """Return the known poses from `start` [s] on, and the one before; for how long positions were held is lost."""
+        known = self.between(start, np.inf)
+        return Track(known.times, known.poses, np.diff(known.held, prepend=known.held[0]))
+
     def velocity_at(self, time: float) -> np.ndarray:
         """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
         before, after = self.at(np.array([time - _WINDOW, time]))

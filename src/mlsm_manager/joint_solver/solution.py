@@ -174,6 +174,12 @@ class Solution:
         """Return the run with other unknowns."""
         return replace(self, state=state)
 
+    def since(self, scan: int) -> "Solution":
+        """Return `scan` and all later ones as a run that begins with it, without what was known before."""
+        state = State(self.state.nodes[scan:].copy(), self.state.run.copy())
+        state.nodes[:, :YAW] -= state.nodes[0, :YAW]
+        return Solution(self.log.since(scan), self.parameters, state, Submaps(self.submaps.numbers[scan:]))
+
     def move_newest(self, shares: np.ndarray, shift: np.ndarray) -> None:
         """Move the newest nodes by `shares` (k,) of a shift (2,) m."""
         self.state.nodes[-len(shares) :, :2] += np.outer(shares, shift)

@@ -8,6 +8,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
 from mlsm_manager.localisation.keyframe_carving import KeyframeCarving
 from mlsm_manager.localisation.keyframe_map import KeyframeMaps, MapSettings
@@ -101,6 +102,10 @@ class Estimator(ABC):
     def odometry(self) -> str:
         """What was found out about the odometry, as text for people; empty where nothing had to be."""
         return ""
+
+    def newest_run(self, turns: int) -> Optional[Solution]:
+        """Return the newest `turns` of the head as a run of their own; None where no solver follows them."""
+        return None
 
     def verdicts(self) -> List[Verdict]:
         """Return what the run says of itself, without any truth."""

@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.solution import Fix
+from mlsm_manager.joint_solver.solution import Fix, Solution
 from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.joint_session import (
@@ -101,6 +101,9 @@ class Joint(Estimator):
     @property
     def hypotheses(self) -> Optional[Hypotheses]:
         return self._session.hypotheses if self._session is not None else None
+
+    def newest_run(self, turns: int) -> Optional[Solution]:
+        return None if self._session is None else self._session.newest_run(turns)
 
     @property
     def odometry(self) -> str:

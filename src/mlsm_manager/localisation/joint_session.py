@@ -12,8 +12,9 @@ from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.solution import Fix
+from mlsm_manager.joint_solver.solution import Fix, Solution
 from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
@@ -32,6 +33,8 @@ _MOST_SCANS = 30
 """For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
 _CHECKED_SCANS = 20
 """Scans that are checked for their agreement with the map: about the window of the solver."""
+_BEFORE = 10.0
+"""s: of odometry before a run, by which its first beams may be late."""
 _MOST_APART = 200
 """Scans whose place in the map is not known that may still be moved: an hour's, since drawing takes as long as there
 are many."""
@@ -168,6 +171,13 @@ class JointSession:
         hypotheses = self.hypotheses
         sonar = self.solver.log.sonar_in_base
         return self.resumed(hypotheses.parameters, sonar, self.T_map_odom, self.scans, hypotheses.stored())
+
+    def newest_run(self, turns: int) -> Solution:
+        """Return the newest turns of the head as a run of their own, which shares nothing with this one."""
+        log, parts = self.solver.log, self.solver.parameters.parts_per_turn
+        run = self.solver.solution.since(max(log.scan_count - turns * parts, 0))
+        odometry = OdometryLog.of(log.odometry.track_from(run.log.node_times[0] - _BEFORE))
+        return replace(run, log=run.log.since(0, odometry))
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""

@@ -10,6 +10,7 @@ from typing import Any, Callable, Deque, List, Mapping, Optional, Tuple
 import numpy as np
 
 from georeferencing.origin import STORED, Origin
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.following import Following
@@ -36,6 +37,7 @@ _LEAP = 600.0
 # s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
 # that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
+_TURNS_COMPARED = 40  # turns of the head in which causes are looked for: ten minutes
 _NEWEST = 3  # scans in which a vehicle is searched on request; two must be found
 
 
@@ -124,6 +126,14 @@ class Localiser:
         """What was found out about the odometry, as text for people; empty where nothing had to be."""
         with self._lock:
             return self.estimator.odometry
+
+    def look_for_causes(self) -> None:
+        """Look in the newest scans for what is wrong; takes seconds of a core where something is."""
+        self.following.found.look(self._newest_run)
+
+    def _newest_run(self) -> Optional[Solution]:
+        with self._lock:
+            return self.estimator.newest_run(_TURNS_COMPARED)
 
     def verdicts(self) -> List[Verdict]:
         """Return what the run says of itself, without any truth."""

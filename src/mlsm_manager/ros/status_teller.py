@@ -1,5 +1,6 @@
 """Tells the position as it is known now: in words, as a pose with its covariance, and in rviz at the vehicle."""
 
+import time
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -25,6 +26,7 @@ from sonar_processing.ros.conversions import header
 from underwater_map_construction.msg import PositionStatus
 
 _PERIOD = 1.0  # s
+_REST = 5.0  # times as long as a look for causes lasts, until the next one
 _AMBER = ColorRGBA(1.0, 0.75, 0.1, 1.0)
 _COLORS = {
     PositionState.GOOD: ColorRGBA(0.35, 0.9, 0.4, 1.0),
@@ -70,7 +72,9 @@ class StatusTeller:
         self._pose = rospy.Publisher(topics.POSE_NOW, PoseWithCovarianceStamped, queue_size=2)
         self._markers = rospy.Publisher(topics.STATUS_MARKERS, MarkerArray, queue_size=2)
         self._letter = 0.0
-        every(_PERIOD, self._look_and_tell, health)
+        self._next_look = -np.inf
+        every(_PERIOD, self.tell, health)
+        every(_PERIOD, self._look, health)
 
     def hear(self, distances: np.ndarray) -> None:
         """Learn how far (n,) [m] the echoes of a scan are: as large as these is what is drawn, and never smaller."""
@@ -92,9 +96,12 @@ class StatusTeller:
         if T_map_base is not None:
             self._publish(state, text, place, T_map_base)
 
-    def _look_and_tell(self) -> None:
-        self._localiser.following.found.look()
-        self.tell()
+    def _look(self) -> None:
+        """Look for causes, for no more than a small share of the time: other nodes need the core, too."""
+        begin = time.monotonic()
+        if begin >= self._next_look:
+            self._localiser.look_for_causes()
+            self._next_look = time.monotonic() + _REST * (time.monotonic() - begin)
 
     def _place_now(self) -> Tuple[Optional[PlaceNow], Optional[np.ndarray]]:
         """Return how good the position is, and T_map_base (4, 4) as tf tells it; None for what is not known."""

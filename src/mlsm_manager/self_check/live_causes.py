@@ -2,21 +2,23 @@
 
 import threading
 from collections import deque
-from typing import Deque, List, Sequence, Tuple
+from typing import Callable, Deque, List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.batch_solver import fit_of
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause, of_steps, of_stuck, ranked, widened
+from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
+from mlsm_manager.self_check.motion_findings import MotionFindings, motion_findings
 from mlsm_manager.self_check.standing import standing_causes
 from node_support.geometry import composed, inverse
 
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
-_BETWEEN = 3  # scans between two looks: a look takes most of a second of a core
 _MOST_PLACES = 20000  # four days of scans of 16 s
 
 
@@ -34,8 +36,9 @@ class LiveCauses:
             self._scans: Deque[Scan] = deque(maxlen=_NEWEST)
             self._places: Deque[Tuple[float, float, float]] = deque(maxlen=_MOST_PLACES)
             self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
-            self._new = 0
+            self._is_new = False
             self._found: List[Cause] = []
+            self._spread = np.zeros((2, 2))
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
@@ -43,21 +46,38 @@ class LiveCauses:
             self._scans.append(scan)
             self._corrections.append(composed(pose, inverse(scan.reference_pose)))
             self._places.append((scan.reference_time, float(pose[0]), float(pose[1])))
-            self._new += 1
+            self._is_new = True
 
-    def look(self) -> None:
-        """Look for causes in the newest scans, if there are enough new ones since the last look."""
+    def look(self, newest_run: Callable[[], Optional[Solution]] = lambda: None) -> None:
+        """Look for causes in the newest scans, if there is one since the last look; takes a second of a core or more.
+
+        newest_run: gives that of these scans, as it is solved; None where no solver follows them.
+        """
         with self._lock:
-            if self._new < _BETWEEN or len(self._scans) < _FEWEST:
+            if not self._is_new or len(self._scans) < _FEWEST:
                 return
-            self._new, scans, places = 0, list(self._scans), self._places
+            self._is_new, scans, places = 0, list(self._scans), self._places
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
         track = _track(scans)
-        found = [*echo_findings(scans, self.sonar_in_base, corrections).causes, *standing_causes(scans, track)]
+        of_echoes = echo_findings(scans, self.sonar_in_base, corrections).causes
+        of_beams, spread = standing_causes(scans, track), np.zeros((2, 2))
+        found = [*of_echoes, *of_beams]
+        run = newest_run()
+        if run is not None:
+            motion = _motion_of(run, [cause.fault for cause in found if cause.fault is not None])
+            found, spread = motion.told_with(of_echoes, of_beams), motion.spread(run.log.node_times[-1:])[0]
         found += [of_stuck(*one) for one in stuck_headings(track)]
         with self._lock:
             if self._places is places:
-                self._found = found
+                self._learn(found, spread, scans[0].start)
+
+    def _learn(self, found: List[Cause], spread: np.ndarray, begin: float) -> None:
+        """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after."""
+        kinds = {cause.fault.kind for cause in found if cause.fault is not None}
+        past = [cause for cause in self._found if cause.begin < begin and cause.fault is not None]
+        self._found = [*found, *(cause for cause in past if cause.fault.kind not in kinds)]
+        if not self._found or np.trace(spread) > np.trace(self._spread):
+            self._spread = spread
 
     def causes(self, steps: Sequence[Step]) -> List[Cause]:
         """Return what is wrong, ranked; steps: of the odometry, which were left out."""
@@ -67,10 +87,17 @@ class LiveCauses:
         """Return what the causes add to the covariance (2, 2) [m^2] of the newest place."""
         causes = self.causes(steps)
         with self._lock:
-            places = np.array(self._places if causes else [])
+            places, spread = np.array(self._places if causes else []), self._spread
         if not len(places):
-            return np.zeros((2, 2))
-        return widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
+            return spread
+        return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
+
+
+def _motion_of(run: Solution, suspected: Sequence[Fault]) -> MotionFindings:
+    """Return what speaks against odometry and sonar of a run, and what its course says of the mount."""
+    track = run.log.odometry.track_from(-np.inf)
+    motion = motion_findings(run, fit_of(run), track, suspected)
+    return motion.with_course(track.with_poses(motion.run.path(track.times)))
 
 
 def _track(scans: Sequence[Scan]) -> Track:

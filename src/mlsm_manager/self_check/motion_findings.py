@@ -120,7 +120,8 @@ def motion_findings(
     show.
     """
     found = MotionFindings(run, fit, track)
-    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST:
+    tells = np.ptp(track.poses, axis=0).any()
+    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not tells:
         return found
     first = places = _places(run)
     for _ in range(_FAULTS + 1):

@@ -252,12 +252,22 @@ def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(
     assert live.causes([]) == []
 
 
+def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows():
+    drifting = broken.compass_drifts(WHOLE, MIDDLE, 4.0)
+    localiser = LocaliserParameters().build_localiser(drifting.sonar_in_base)
+    for scan in scans_in(drifting):
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+    assert localiser.following.causes()[0].text.startswith("the compass drifts by +")
+    assert np.trace(localiser.following.found.covariance([])) > 0.05
+
+
 def test_scans_that_are_not_matched_are_not_compared():
     localiser = LocaliserParameters().build_localiser()
     localiser.match(False)
     for scan in scans_in(broken.mount_turned(WHOLE, 120.0)):
         localiser.take_scan(scan)
-    localiser.following.found.look()
+    localiser.look_for_causes()
     assert localiser.following.causes() == []
 
 

@@ -1,0 +1,117 @@
+"""Prints what is told while a vehicle goes on in whose recording something is broken: is a position ever called good?
+
+Each row: the recording and the fault; distance [m] of the live positions from those of the unbroken recording, in the
+mean and at most; "told": median of the stated deviation [m]; "covered": share of the positions within 2.5 of it;
+"good": share that is called good though it is farther off; the cause that is named first once all was seen, and after
+how many seconds from the beginning of the fault, or of the run, anything was named.
+"""
+
+import re
+from argparse import Namespace
+from typing import List, NamedTuple, Optional
+
+import numpy as np
+
+from benchmarks.fault_rows import faults
+from benchmarks.faults import SOURCES, source
+from benchmarks.harness import benchmark_parser
+from mlsm_manager.localisation.localiser import Localiser
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
+from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.replay import ReplayParameters
+from mlsm_manager.scan_matching.scan_path import POSITION
+from node_support.errors import RefusedInput
+from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.filters.echo_extractor import EchoExtractor
+
+_COVERS = 2.5  # stated deviations
+
+
+class Told(NamedTuple):
+    """What is told at the end of a scan. time: s. place: (2,) m in map. deviation: m. is_good: whether it is called so.
+
+    causes: that are named, ranked, of what is not mended.
+    """
+
+    time: float
+    place: np.ndarray
+    deviation: float
+    is_good: bool
+    causes: List[str]
+
+
+def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
+    """Return what the live nodes tell of a recording, scan by scan, once there is a fix."""
+    localiser = parameters.build_localiser(recording.sonar_in_base)
+    beams = recording.corrected(parameters.part(BeamCorrection))
+    found = []
+    for scan, _ in scans_of(beams, EchoExtractor(parameters.echoes())):
+        try:
+            localiser.take_scan(scan)
+        except RefusedInput:
+            continue
+        localiser.look_for_causes()
+        odometry = recording.track.at(np.array(scan.reference_time))
+        found.append(_told(localiser, scan.reference_time, odometry))
+    return [one for one in found if one is not None]
+
+
+def _told(localiser: Localiser, time: float, odometry: np.ndarray) -> Optional[Told]:
+    now, causes = localiser.place_now(time, odometry), localiser.following.causes()
+    if now is None:
+        return None
+    doubts = doubts_of(now, causes, localiser.verdicts(), {}, "")
+    state, _ = position_state(now, localiser.is_lost, is_provisional=False, doubts=doubts)
+    place = localiser.estimator.belief.theta[POSITION]
+    named = [cause.text for cause in causes if not cause.is_mended]
+    return Told(time, place, now.deviation, state is PositionState.GOOD, named)
+
+
+def line(told: List[Told], whole: List[Told], begin: float) -> str:
+    """Return the figures of a broken run beside the unbroken one; begin: s, of the fault."""
+    times, places = np.array([one.time for one in whole]), np.array([one.place for one in whole])
+    right = np.array([[np.interp(one.time, times, axis) for axis in places.T] for one in told])
+    off = np.hypot(*(np.array([one.place for one in told]) - right).T)
+    stated = np.array([one.deviation for one in told])
+    covered = off <= _COVERS * stated
+    good = np.array([one.is_good for one in told])
+    named = [one.time for one in told if one.causes]
+    after = f"after {named[0] - begin:.0f} s" if named else "never"
+    return (
+        f"{off.mean():6.2f} most {off.max():6.2f} told {np.median(stated):6.2f} covered {100 * covered.mean():3.0f} % "
+        f"good {100 * (good & ~covered).mean():3.0f} %  {after}\n    {told[-1].causes[0] if told[-1].causes else '-'}"
+    )
+
+
+def main() -> None:
+    """Print the table, line by line."""
+    arguments = _arguments()
+    parameters = ReplayParameters().changed(profile_values(OdometryKind(arguments.odometry)))
+    for name in arguments.sources:
+        recording = source(name, arguments.seconds)
+        whole = told_by(recording, parameters)
+        for fault, (_, make) in faults(recording.seconds, arguments.seed).items():
+            if re.search(arguments.rows, f"{name}: {fault}"):
+                broken = told_by(make(recording), parameters)
+                begin = whole[0].time + _begin(make)
+                print(f"{name + ': ' + fault:55} {line(broken, whole, begin)}", flush=True)
+
+
+def _begin(make: object) -> float:
+    return float(getattr(make, "keywords", {}).get("at", 0.0))
+
+
+def _arguments() -> Namespace:
+    parser = benchmark_parser("live_faults", __doc__)
+    parser.add_argument("--rows", default=".", metavar="REGEX", help="which ones, of 'SOURCE: FAULT'; default: all")
+    parser.add_argument("--sources", nargs="+", default=SOURCES[:2], choices=SOURCES, help="default: %(default)s")
+    parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
+    parser.add_argument("--seed", type=int, help="of other sizes and times than the usual ones")
+    kinds = [kind.value for kind in OdometryKind]
+    parser.add_argument("--odometry", default=OdometryKind.AUTO.value, choices=kinds, help="default: %(default)s")
+    return parser.parse_args()
+
+
+if __name__ == "__main__":
+    main()
