@@ -109,7 +109,7 @@ class ParticleFilter:
         scan = self.scans
         rng = np.random.RandomState([self.seed, scan])
         motion = log.node_motion(np.array([scan, scan + 1]))
-        duration, turn = float(motion.durations[0]), float(np.diff(motion.poses[:, 2])[0])
+        duration, turn = (float(np.diff(each)[0]) for each in (motion.times, motion.poses[:, 2]))
         before = self.particles or Particles.begun(_COUNT, motion.poses[0, :2], _START_SPEED, rng)
         sources = echoes_of(log, parameters, scan)
         longest = self.remembered_turns * parameters.parts_per_turn + 1

@@ -5,7 +5,7 @@ from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
+from mlsm_manager.joint_solver.comparisons import Neighbours, PostComparisons, add_comparisons, met_with, support
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
@@ -22,11 +22,10 @@ from mlsm_manager.joint_solver.normal_equations import (
 )
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.post_comparisons import PostComparisons
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.velocity_models import by_heading
-from mlsm_manager.joint_solver.weak_directions import WeakDirections
+from mlsm_manager.joint_solver.weak_directions import across_weak
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
@@ -170,8 +169,9 @@ class _Batch:
         self._solution = None
         self._move, self._is_begun = np.zeros(self._layout.size), False
         self._lists: Optional[Neighbours] = None
-        scans = np.arange(log.scan_count)
-        self._posts = PostComparisons(solution, scans, np.ones(len(scans)))
+        scans, self._posts = np.arange(log.scan_count), None
+        if self._parameters.post_confidence:
+            self._posts = PostComparisons(log.posts, self._parameters, scans, np.ones(len(scans)))
         self._prior = AdaptedPrior(odometry.mixture, solution.prior_term)
 
     def converge(self) -> Tuple[int, bool]:
@@ -187,8 +187,9 @@ class _Batch:
         equations, parameters = self._expected(), self._parameters
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self._met()
-        add_comparisons(equations, self._layout, pairs, points, points, parameters, parameters.cut)
-        self._posts.add(equations, self._layout, self._run, parameters.cut)
+        add_comparisons(equations, self._layout, [(pairs, points, points)], parameters, parameters.cut)
+        if self._posts is not None:
+            self._posts.add(equations, self._layout, self._run.placed_posts(self._posts.rows), parameters.cut)
         newest = self._layout.node_start(self._layout.last)
         self._prior.add(equations, newest, self.state.nodes[-1])
         self._solution = solution_of(equations)
@@ -216,7 +217,7 @@ class _Batch:
         mean = np.append(odometry.first_node(), parameters.run_mean(self._run.log))
         deviations = np.append(odometry.first_deviations(), parameters.run_deviations(self._run.log))
         equations.add_prior(self._layout.with_run(np.array([0]))[0], value, mean, deviations)
-        odometry.add_steps(equations, self._layout, self.state.nodes, self._motion)
+        odometry.add_steps(equations, self._layout.step_starts, self.state.nodes, self._motion)
         if self._fixed_steps is not None:
             now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
             _add_fixed_steps(equations, self._layout, now, fixed)
@@ -226,12 +227,11 @@ class _Batch:
         """Return all points and their comparisons."""
         parameters = self._parameters
         rows = self._run.log.rows(0, self._layout.last)
-        points = self._run.placed(rows)
-        points = WeakDirections.of([points], parameters).without(points, points.scans)
+        _, (points,) = across_weak([self._run.placed(rows)], parameters)
         if self._lists is None:
             self._lists = Neighbours(points, parameters.group_scans)
-        pairs = pairs_of(self._lists, points, points, parameters.cut, parameters)
-        return points, self._run.submaps.within(pairs, points, points)
+        met = met_with([self._lists], points, [points], parameters.cut, parameters)
+        return points, self._run.submaps.within(met)[0][0]
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
@@ -255,7 +255,7 @@ class _Batch:
         compass, motion = self._odometry.compass, self._motion
         if compass is None:
             return np.zeros((len(nodes), POSE_COLUMNS, POSE_COLUMNS))
-        columns = by_heading(compass, self._layout, motion.poses[:, YAW], motion.durations, self._solution.solve)
+        columns = by_heading(compass, self._layout, motion.poses[:, YAW], np.diff(motion.times), self._solution.solve)
         moved = columns[self._layout.pose_columns(nodes)]
         return moved @ moved.transpose(0, 2, 1)
 

@@ -1,9 +1,10 @@
-"""Comparisons of points with surfaces that other scans heard: which count, how much, what they say of the unknowns.
+"""Comparisons of points with surfaces and posts that other scans heard: which count, and what they say of the unknowns.
 
 A point is compared with its nearest neighbours in every group of scans.
 """
 
-from typing import Tuple
+from dataclasses import replace
+from typing import Iterable, Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -21,6 +22,7 @@ from mlsm_manager.joint_solver.compiled_neighbours import shared_neighbours
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, Layout, NormalEquations
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.run_log import PointTable
 from mlsm_manager.joint_solver.surface_points import ramp
 from mlsm_manager.joint_solver.weak_directions import discounted
 
@@ -30,6 +32,8 @@ be decided by the last bit where two are equally near. More would compare each p
 FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
 COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one
 _PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
+Comparison = Tuple[Pairs, PlacedPoints, PlacedPoints]
+"""Pairs, with the points and the surfaces that they compare."""
 
 
 class Neighbours:
@@ -86,25 +90,31 @@ def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, parameters: Solv
     )
 
 
-def add_comparisons(
-    equations: NormalEquations,
-    layout: Layout,
-    pairs: Pairs,
-    sources: PlacedPoints,
-    targets: PlacedPoints,
+def met_with(
+    lists: Sequence[Neighbours], sources: PlacedPoints, sets: Sequence[PlacedPoints], cut: float,
     parameters: SolverParameters,
-    cut: float,
+) -> List[Comparison]:  # fmt: skip
+    """Return the comparisons of `sources` with each of some `sets` of surfaces, each with its list of neighbours."""
+    pairs = (pairs_of(own, sources, targets, cut, parameters) for own, targets in zip(lists, sets))
+    return [(each, sources, targets) for each, targets in zip(pairs, sets)]
+
+
+def add_comparisons(
+    equations: NormalEquations, layout: Layout, met: Iterable[Comparison], parameters: SolverParameters, cut: float
 ) -> int:
-    """Add the distances of `sources` from their neighbours' surfaces; return how many there are."""
-    if not len(pairs.rows):
-        return 0
-    scans, other_scans, information, gradient = summed(pairs, sources, targets, parameters, cut)
-    if parameters.normal_deviation > 0.0:
-        # The parts of a turn together hear walls on all sides, each part alone perhaps one.
-        turns = scans // parameters.parts_per_turn
-        information, gradient = discounted(information, gradient, turns, _PLACES, parameters.normal_deviation)
-    equations.add_terms(_columns(scans, other_scans, layout), information, gradient)
-    return len(pairs.rows)
+    """Add the distances of points from the surfaces that they are compared with; return how many there are."""
+    count = 0
+    for pairs, sources, targets in met:
+        count += len(pairs.rows)
+        if not len(pairs.rows):
+            continue
+        scans, other_scans, information, gradient = summed(pairs, sources, targets, parameters, cut)
+        if parameters.normal_deviation > 0.0:
+            # The parts of a turn together hear walls on all sides, each part alone perhaps one.
+            turns = scans // parameters.parts_per_turn
+            information, gradient = discounted(information, gradient, turns, _PLACES, parameters.normal_deviation)
+        equations.add_terms(_columns(scans, other_scans, layout), information, gradient)
+    return count
 
 
 def summed(
@@ -148,3 +158,71 @@ def _columns(scans: np.ndarray, other_scans: np.ndarray, layout: Layout) -> np.n
     poses = layout.pose_columns(nodes)
     run = np.broadcast_to(layout.run_start + np.arange(RUN_COLUMNS), (len(scans), RUN_COLUMNS))
     return np.concatenate([poses.reshape(len(scans), -1), run], axis=1)
+
+
+_NEAR_IN_TIME = 5  # turns before and after, a minute, in which a vehicle passes a post
+_CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by chance, to something that stays
+
+
+class PostComparisons:
+    """Comparisons of echoes that stand alone, as of posts, in free scans with those of all others in view.
+
+    They are compared along the line of sight and across it. rows: of these echoes in the table of posts.
+    """
+
+    def __init__(
+        self, posts: PointTable, parameters: SolverParameters, scans: np.ndarray, importance: np.ndarray
+    ) -> None:
+        """scans: (s,) those in view, ascending. importance: (s,) factors of what is compared with them."""
+        self.rows, counts = posts.rows_of(scans)
+        self._importance = parameters.post_confidence * np.repeat(importance, counts)
+        self._parameters = replace(parameters, normal_deviation=0.0)
+        self._lists: Optional[Neighbours] = None
+
+    def add(self, equations: NormalEquations, layout: Layout, points: PlacedPoints, cut: float) -> int:
+        """Add the comparisons of those of the `points` that free scans heard; return how many there are."""
+        if not self._importance.any():
+            return 0
+        sources = points.selected(points.scans >= layout.first)
+        if self._lists is None:
+            self._lists = Neighbours(points, self._parameters.group_scans)
+        near = _NEAR_IN_TIME * self._parameters.parts_per_turn
+        pairs = post_pairs(self._lists, sources, points, cut, near).weighted(self._importance)
+        return add_comparisons(equations, layout, along_and_across(pairs, sources, points), self._parameters, cut)
+
+
+def post_pairs(
+    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
+) -> Pairs:
+    """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets`.
+
+    A point counts if several of the `near_in_time` scans before and after its own heard one there too. Clutter meets
+    clutter by chance, and would say that nothing moves.
+    """
+    rows, neighbours, distance, shares = lists.within(sources, targets, cut)
+    met = shares * ramp(distance, cut, FADING * cut) * targets.qualities[neighbours]
+    near = np.abs(sources.scans[rows] - targets.scans[neighbours]) <= near_in_time
+    confirmed = ramp(np.bincount(rows, met * near, len(sources)), *_CONFIRMED)
+    importance = met * sources.qualities[rows] * confirmed[rows]
+    kept = importance > 0.0
+    return Pairs(rows[kept], neighbours[kept], importance[kept])
+
+
+def along_and_across(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> "Iterator[Comparison]":
+    """Yield the comparisons along the sources' lines of sight, and those across, as such with surfaces.
+
+    Along, a point is as certain as its range; across, it may be anywhere in its beam: its slant is its range.
+    """
+    i, j = pairs.rows, pairs.neighbours
+    each = Pairs(np.arange(len(i)), np.arange(len(i)), pairs.importance)
+    heard, met = sources.selected(i), targets.selected(j)
+    for axis in (heard.normals, np.column_stack([-heard.normals[:, 1], heard.normals[:, 0]])):
+        yield (
+            each,
+            replace(heard, slants=_slants(heard.arms, axis)),
+            replace(met, normals=axis, slants=_slants(met.arms, axis)),
+        )
+
+
+def _slants(arms: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    return np.abs(arms[:, 0] * axis[:, 1] - arms[:, 1] * axis[:, 0])

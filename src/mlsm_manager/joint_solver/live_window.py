@@ -1,15 +1,21 @@
 """The problem of one scan: the newest nodes against each other and against the nearest groups of frozen scans."""
 
 from dataclasses import dataclass
-from typing import Iterator, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, add_comparisons, pairs_of, support
-from mlsm_manager.joint_solver.compiled_comparisons import Pairs
+from mlsm_manager.joint_solver.comparisons import (
+    Comparison,
+    Neighbours,
+    PostComparisons,
+    add_comparisons,
+    met_with,
+    support,
+)
 from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.loops import Bend, add_loops
-from mlsm_manager.joint_solver.map_support import Met, agreement
+from mlsm_manager.joint_solver.map_support import agreement
 from mlsm_manager.joint_solver.motion_models import frozen_deviations
 from mlsm_manager.joint_solver.normal_equations import (
     DELAY,
@@ -21,10 +27,9 @@ from mlsm_manager.joint_solver.normal_equations import (
     NormalEquations,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.post_comparisons import PostComparisons
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.weak_directions import WeakDirections
+from mlsm_manager.joint_solver.weak_directions import across_weak
 from node_support.geometry import composed, inverse
 
 _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
@@ -64,9 +69,7 @@ def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> Fro
     importance = np.zeros(count)
     importance[known] = fading(distances, solution.parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
-    rows = np.concatenate(
-        [np.empty(0, dtype=np.int64), *(log.rows(number * scans, (number + 1) * scans) for number in numbers)]
-    )
+    rows, _ = log.surfaces.rows_of((numbers[:, np.newaxis] * scans + np.arange(scans)).ravel())
     points = solution.placed(rows)
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
     return FrozenMap(points, per_point, numbers, importance[numbers], solution.state.run.copy())
@@ -142,27 +145,29 @@ class LiveWindow:
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._recent_rows = self._log.rows(self._recent, last)
-        self._newest_start = self._layout.node_start(last)
+        self._starts, self._newest_start = self._layout.step_starts, self._layout.node_start(last)
         self._believed_columns = self._layout.with_run(np.array([first]))[0]
         self._motion = self._log.node_motion(np.arange(first, last + 1))
         self._beliefs = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
         self._known = solution.known
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
-        self._lists: Optional[Tuple[Neighbours, Neighbours]] = None
-        self._met = ()
+        self._lists: List[Neighbours] = []
+        self._met: List[Comparison] = []
         self._posts = self._post_comparisons()
         self._prior = AdaptedPrior(self._odometry.mixture, solution.prior_term)
 
-    def _post_comparisons(self) -> PostComparisons:
-        """Return those with the frozen groups and with the scans since."""
+    def _post_comparisons(self) -> Optional[PostComparisons]:
+        """Return those with the frozen groups and with the scans since; None where posts are ignored."""
+        if not self._parameters.post_confidence:
+            return None
         groups = self._frozen.numbers[:, np.newaxis] * self._scans_per_group + np.arange(self._scans_per_group)
         recent = np.arange(self._recent, self._layout.last)
         importance = np.repeat(self._frozen.group_importance, self._scans_per_group)
         scans, importance = np.append(groups, recent), np.append(importance, np.ones(len(recent)))
         same = self._run.submaps.numbers[scans] == self._run.submaps.newest
         scans, importance = scans[same], importance[same]
-        return PostComparisons(self._run, scans, importance)
+        return PostComparisons(self._log.posts, self._parameters, scans, importance)
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its group's, and one more for nodes beside the window."""
@@ -183,10 +188,12 @@ class LiveWindow:
         equations = NormalEquations(self._layout.size, len(self._held_covariance))
         self._add_beliefs(equations)
         free = self._state.nodes[self._layout.first :]
-        self._odometry.add_steps(equations, self._layout, free, self._motion)
+        self._odometry.add_steps(equations, self._starts, free, self._motion)
         self._run.fixes.add(equations, self._layout, self._motion.poses, free)
-        self._comparisons = self._add_surfaces(equations, cut)
-        self._comparisons += self._posts.add(equations, self._layout, self._run, cut)
+        met = self._surfaces_met(cut)
+        self._comparisons = add_comparisons(equations, self._layout, met, self._parameters, cut)
+        if self._posts is not None:
+            self._comparisons += self._posts.add(equations, self._layout, self._run.placed_posts(self._posts.rows), cut)
         self._prior.add(equations, self._newest_start, self._state.nodes[-1])
         if bend is not None:
             add_loops(equations, self._layout, bend.loops, self._state.nodes, bend.start)
@@ -234,41 +241,24 @@ class LiveWindow:
         of_run[DELAY] *= _FORGOTTEN_DELAY
         return np.append(node, frozen.run), np.append(frozen_deviations(deviations), of_run)
 
-    def _add_surfaces(self, equations: NormalEquations, cut: float) -> int:
-        """Compare the free scans with all surfaces up to `cut` [m] apart; return the number of comparisons."""
-        met, parameters = self._surfaces_met(cut), self._parameters
-        return sum(add_comparisons(equations, self._layout, *some, parameters, cut) for some in met)
+    def _surfaces_met(self, cut: float) -> List[Comparison]:
+        """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed.
 
-    def _surfaces_met(self, cut: float) -> Met:
-        """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed."""
+        Neighbours are looked up once for all steps.
+        """
         parameters = self._parameters
-        recent = self._run.placed(self._recent_rows)
-        frozen = self._frozen.moved_by_run(self._state.run)
-        weak = WeakDirections.of((frozen, recent), parameters)
-        frozen, recent = (weak.without(points, points.scans) for points in (frozen, recent))
+        placed = self._frozen.moved_by_run(self._state.run), self._run.placed(self._recent_rows)
+        weak, (frozen, recent) = across_weak(placed, parameters)
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        to_frozen, to_recent = self._compared(sources, (frozen, recent), cut)
-        met = [(to_frozen, sources, frozen), (to_recent, sources, recent)]
-        summed = [(to_frozen.weighted(self._frozen.importance), sources, frozen), met[1]]
+        self._lists = self._lists or [Neighbours(one, self._scans_per_group) for one in (frozen, recent)]
+        met = met_with(self._lists, sources, (frozen, recent), cut, parameters)
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])
-            to_known = self._run.submaps.within(to_known, sources, known)
-            met.insert(0, (to_known, sources, known))
-            summed.insert(1, met[0])
-        self._met = tuple(met)
-        return summed
-
-    def _compared(
-        self, sources: PlacedPoints, surfaces: Tuple[PlacedPoints, PlacedPoints], cut: float
-    ) -> Iterator[Pairs]:
-        """Compare `sources` with frozen and recent points, whose neighbours are looked up once for all steps."""
-        parameters = self._parameters
-        if self._lists is None:
-            self._lists = tuple(Neighbours(targets, parameters.group_scans) for targets in surfaces)
-        for lists, targets in zip(self._lists, surfaces):
-            pairs = pairs_of(lists, sources, targets, cut, parameters)
-            yield self._run.submaps.within(pairs, sources, targets)
+            met.insert(1, (to_known, sources, known))
+        self._met = self._run.submaps.within(met)
+        to_frozen, *others = self._met
+        return [(to_frozen[0].weighted(self._frozen.importance), *to_frozen[1:]), *others]
 
     def _move(self, step: np.ndarray) -> None:
         run_start = self._layout.run_start
@@ -281,7 +271,7 @@ class LiveWindow:
         """Return that of the free nodes: of echoes on surfaces, less that of odd motions."""
         equations = NormalEquations(self._layout.size, len(self._held_covariance))
         self._add_beliefs(equations)
-        self._odometry.add_steps(equations, self._layout, self._state.nodes[self._layout.first :], self._motion)
+        self._odometry.add_steps(equations, self._starts, self._state.nodes[self._layout.first :], self._motion)
         met = self._surfaces_met(self._parameters.cut)
         return sum(support(*some, self._parameters) for some in met) - 0.5 * equations.cost
 

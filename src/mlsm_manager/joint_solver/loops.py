@@ -131,8 +131,8 @@ def with_newest(solution: Solution, before: Sequence[Loop]) -> Tuple[Loop, ...]:
     if not in_turn or scan < APART or len(own) < FEWEST_POINTS:
         return kept
     sources = solution.placed(own[:: max(1, len(own) // MOST_POINTS)])
-    rows = [solution.log.rows(one, one + 1) for one in _landmarks(solution, *reach_of(sources))]
-    older = solution.placed(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
+    rows, _ = solution.log.surfaces.rows_of(_landmarks(solution, *reach_of(sources)))
+    older = solution.placed(rows)
     loop = loop_of(sources, older, scan, parameters) if len(older) else None
     return kept if loop is None else (*kept, loop)
 

@@ -6,7 +6,7 @@ from typing import Sequence, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.compiled_comparisons import Pairs
+from mlsm_manager.joint_solver.comparisons import Comparison
 from mlsm_manager.joint_solver.estimate import misfit_covariance
 from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -22,8 +22,6 @@ _FITS = 0.65  # share of a turn's points on what was heard before from which on 
 _UNSETTLED_TURNS = 5  # a run's first scans correct each other, and a scan may be put right by the next ones
 _SPEED = 0.5  # m/s: the usual speed of a small vehicle; nothing else tells how far it went
 _ON_PLANE = 1.0  # deviations within which a point lies on the plane of the one that it is compared with
-Met = Sequence[Tuple[Pairs, PlacedPoints, PlacedPoints]]
-"""Comparisons with the sets of points that they compare."""
 
 
 class Surfaces:
@@ -131,7 +129,7 @@ def misfits_with_newest(solution: Solution, misfits: np.ndarray) -> np.ndarray:
     return np.append(misfits[:first], misfit_variances(solution, first))
 
 
-def agreement(met: Met, scan: int, parameters: SolverParameters) -> Tuple[float, float, np.ndarray]:
+def agreement(met: Sequence[Comparison], scan: int, parameters: SolverParameters) -> Tuple[float, float, np.ndarray]:
     """Return the share of a scan's comparisons in which its point lies on its neighbour's surface, the mean distance
     [m] from it, and the sum (2, 2) of the outer products of these surfaces' normals; 0 without any.
     """

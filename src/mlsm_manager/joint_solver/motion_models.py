@@ -5,11 +5,11 @@ velocity_models those of which the velocity is unknown.
 """
 
 from dataclasses import dataclass, replace
-from typing import Dict, NamedTuple, Optional, Protocol
+from typing import Callable, Dict, Mapping, NamedTuple, Optional, Protocol
 
 import numpy as np
 
-from mlsm_manager.joint_solver.normal_equations import POSE, Layout, NormalEquations
+from mlsm_manager.joint_solver.normal_equations import POSE, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.prior_mixture import PriorMixture
 from mlsm_manager.scan_matching.prediction import Fading
@@ -41,20 +41,22 @@ class OdometryModel(Protocol):
 
     Nodes have `width` unknowns: corrections x, y, yaw of the reported pose, then those of the model.
 
-    The path between two nodes is the model's reference path, turned and scaled by `gain`.
+    The path between two nodes is the model's reference path, turned and scaled by `gain`. reference: returns its
+    positions (m,) x + i y [m]; they are even where the motion is.
+    mixture: priors of some unknowns of a node, of which one holds for the whole run; None where there is one only.
+    rival: the model of another odometry that the vehicle may have; None where its kind was named.
+    compass: how wrong the reported heading may be; None where none is reported.
+    distance_deviation: relative standard deviation of reported distances; infinite where none are reported.
+    position_walk: random walk of reported positions, m/sqrt(s).
     """
 
     width: int
-
-    @property
-    def mixture(self) -> Optional[PriorMixture]:
-        """Priors of some unknowns of a node, of which one holds for the whole run; None where there is one only."""
-        return None
-
-    @property
-    def rival(self) -> "Optional[OdometryModel]":
-        """The model of another odometry that the vehicle may have; None where its kind was named."""
-        return None
+    reference: Callable[[Motion], np.ndarray]
+    mixture: Optional[PriorMixture] = None
+    rival: "Optional[OdometryModel]" = None
+    compass: "Optional[Compass]" = None
+    distance_deviation: float
+    position_walk: float
 
     @property
     def freed(self) -> "Optional[OdometryModel]":
@@ -62,22 +64,9 @@ class OdometryModel(Protocol):
         return None
 
     @property
-    def compass(self) -> "Optional[Compass]":
-        """How wrong the reported heading may be; None where none is reported."""
-        return None
-
-    @property
     def calibrated(self) -> Dict[str, int]:
         """Columns that the next run may start from, by name."""
         return {}
-
-    @property
-    def distance_deviation(self) -> float:
-        """Relative standard deviation of reported distances; infinite where none are reported."""
-
-    @property
-    def position_walk(self) -> float:
-        """Random walk of reported positions, m/sqrt(s)."""
 
     def first_node(self) -> np.ndarray:
         """Return the unknowns (width,) expected at the first node, where the map's origin is the odometry's."""
@@ -88,11 +77,8 @@ class OdometryModel(Protocol):
     def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
         """Return the unknowns (n, width) expected at `after` (n), given those at `before` (n)."""
 
-    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        """Add what ties the free nodes together. nodes: (n, width), motion: (n), of nodes layout.first to last."""
-
-    def reference(self, motion: Motion) -> np.ndarray:
-        """Return the positions (m,) x + i y [m] of the reference path; even where the motion is."""
+    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        """Add what ties n `nodes` (n, width) together; starts: (n - 1,) columns of all but the last. motion: (n)."""
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         """Return the complex factors (n,) of the reference path after `nodes` (n, width)."""
@@ -121,9 +107,8 @@ class Transition(NamedTuple):
     @classmethod
     def of(cls, odometry: OdometryModel, nodes: np.ndarray, motion: Motion) -> "Transition":
         """Return that from the first to the second of `nodes` (2, width), where the odometry reported `motion` (2)."""
-        layout = Layout(0, 1, odometry.width)
-        equations = NormalEquations(layout.size)
-        odometry.add_steps(equations, layout, nodes, motion)
+        equations = NormalEquations(2 * odometry.width)
+        odometry.add_steps(equations, np.zeros(1, dtype=np.int64), nodes, motion)
         information, _ = equations.dense()
         here, there = slice(0, odometry.width), slice(odometry.width, 2 * odometry.width)
         noise = np.linalg.inv(information[there, there])
@@ -141,10 +126,6 @@ class Change(NamedTuple):
 
     kept: np.ndarray
     variance: np.ndarray
-
-
-Changes = Dict[int, Change]
-"""Of unknowns, by their columns of a node."""
 
 
 @dataclass(frozen=True)
@@ -170,13 +151,16 @@ class Compass:
         return replace(self, heading_deviation=_FREED_HEADING, heading_correlation_time=_FREED_TIME)
 
 
-def walk(deviation: float, durations: np.ndarray) -> Change:
-    """Return the change of an unknown that walks by `deviation` [1/sqrt(s)]."""
-    return Change(np.ones(len(durations)), deviation**2 * durations)
+def add_changes(
+    equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray,
+    walks: Mapping[int, float], changes: Mapping[int, Change],
+) -> None:  # fmt: skip
+    """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width).
 
-
-def add_changes(equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, changes: Changes) -> None:
-    """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width)."""
+    Both by columns of a node. walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others.
+    """
+    one = np.ones(len(durations))
+    changes = {**changes, **{column: Change(one, each**2 * durations) for column, each in walks.items()}}
     columns, values = np.array(list(changes))[:, np.newaxis], nodes[:, list(changes)].T
     kept, variances = (np.stack(each) for each in zip(*changes.values()))
     places = np.stack([starts + nodes.shape[1] + columns, starts + columns], axis=-1)

@@ -59,6 +59,11 @@ class Layout:
         """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
 
+    @property
+    def step_starts(self) -> np.ndarray:
+        """(last - first,) places of the first columns of all free nodes but the last."""
+        return self.width * np.arange(self.last - self.first)
+
     def with_run(self, nodes: np.ndarray) -> np.ndarray:
         """Return the columns (n, width + 2) of all unknowns of free `nodes` (n,), each followed by those of the run."""
         own = self.node_start(nodes)[:, np.newaxis] + np.arange(self.width)

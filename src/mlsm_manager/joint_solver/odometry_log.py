@@ -108,11 +108,6 @@ class Motion:
         """Return the motion at `rows`: a slice or an array of indices."""
         return Motion(self.times[rows], self.poses[rows], self.ahead[rows], self.held[rows])
 
-    @property
-    def durations(self) -> np.ndarray:
-        """(m - 1,) s between the times."""
-        return np.diff(self.times)
-
 
 class OdometryLog:
     """Poses T_odom_base of a run in the order of time; grows at its end, and yaw never jumps by a turn."""
@@ -183,10 +178,10 @@ class OdometryLog:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""
         return _between(times, self._table["times"], self._table["poses"])
 
-    def between(self, start: float, end: float) -> Motion:
-        """Return the known poses between `start` and `end` [s], and the nearest beyond both."""
+    def path(self, times: np.ndarray, start: float, end: float) -> Tuple[Motion, Motion]:
+        """Return the motion at `times` (m,), and the known one from `start` to `end` [s] with the nearest beyond."""
         near = _around(self._table["times"], start, end)
-        return Motion(*self._table.chosen(near, "times", "poses", "ahead", "held"))
+        return self.motion(times), Motion(*self._table.chosen(near, "times", "poses", "ahead", "held"))
 
     def track_from(self, start: float) -> Track:
         """Return the known poses from `start` [s] on, and the one before; for how long positions were held is lost."""

@@ -192,10 +192,8 @@ def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -
 
 def _silent_before(log: RunLog, scan: int) -> int:
     """Return how many scans before `scan` heard too little to tell a place, one after the other."""
-    count = 0
-    while count < scan and len(log.rows(scan - count - 1, scan - count)) < FEWEST_POINTS:
-        count += 1
-    return count
+    heard = np.flatnonzero(log.point_counts[:scan] >= FEWEST_POINTS)
+    return scan - 1 - int(heard[-1]) if len(heard) else scan
 
 
 def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
@@ -210,8 +208,8 @@ def _map_around(solution: Solution, sources: PlacedPoints, reach: float) -> Plac
     if not len(sources):
         return sources
     scans = np.flatnonzero(solution.submaps.numbers == MAP)
-    rows = [solution.log.rows(scan, scan + 1) for scan in scans if scan != sources.scans[-1]]
-    targets = solution.placed(np.concatenate([np.empty(0, dtype=np.int64), *rows]))
+    rows, _ = solution.log.surfaces.rows_of(scans[scans != sources.scans[-1]])
+    targets = solution.placed(rows)
     low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
     targets = targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
     return targets if solution.known is None else targets.joined_with(solution.known.around(low, high))

@@ -1,7 +1,8 @@
 """Motion models of odometries that report positions: of a DVL, of the thrusters' commands, or of either."""
 
 from dataclasses import dataclass, fields, replace
-from typing import Dict, NamedTuple, Optional
+from operator import attrgetter
+from typing import Dict, NamedTuple
 
 import numpy as np
 
@@ -13,15 +14,13 @@ from mlsm_manager.joint_solver.motion_models import (
     FIXED_DEVIATION,
     HELD_DEVIATION,
     SCALE,
-    Changes,
     Compass,
     Drift,
     OdometryModel,
     add_changes,
-    walk,
 )
-from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
-from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
+from mlsm_manager.joint_solver.normal_equations import YAW, NormalEquations
+from mlsm_manager.joint_solver.odometry_log import Motion, product, stretched
 from mlsm_manager.joint_solver.prior_mixture import PriorComponent, PriorMixture
 
 _CURRENT = slice(5, 7)
@@ -63,16 +62,20 @@ class ThrusterOdometry(DvlOdometry):
 
 
 class DvlFactors(OdometryModel):
-    """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly."""
+    """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly.
+
+    The reference path is that of the reported positions.
+    """
 
     width = 5
+    reference = attrgetter("positions")
+    _carriers = 0
+    """1 where the velocities after the scale carry the vehicle along, which the odometry cannot feel."""
 
     def __init__(self, parameters: DvlOdometry) -> None:
-        self._parameters = parameters
-
-    @property
-    def compass(self) -> Optional[Compass]:
-        return self._parameters.compass
+        self._parameters, self.compass = parameters, parameters.compass
+        self.distance_deviation, self.position_walk = parameters.scale_deviation, parameters.position_walk
+        self._walks = {DIRECTION: parameters.direction_walk, SCALE: 0.0}
 
     @property
     def freed(self) -> "ThrusterFactors":
@@ -84,14 +87,6 @@ class DvlFactors(OdometryModel):
     def calibrated(self) -> Dict[str, int]:
         return {"odometry_scale": SCALE, "odometry_direction": DIRECTION}
 
-    @property
-    def distance_deviation(self) -> float:
-        return self._parameters.scale_deviation
-
-    @property
-    def position_walk(self) -> float:
-        return self._parameters.position_walk
-
     def first_node(self) -> np.ndarray:
         return np.array([0.0, 0.0, 0.0, self._parameters.direction, self._parameters.scale])
 
@@ -99,10 +94,6 @@ class DvlFactors(OdometryModel):
         own, fixed = self._parameters, FIXED_DEVIATION * 10.0
         walking = np.maximum([own.direction_deviation, own.scale_deviation], HELD_DEVIATION)
         return np.concatenate([[fixed, fixed, own.compass.heading_deviation], walking])
-
-    def reference(self, motion: Motion) -> np.ndarray:
-        """The reported positions."""
-        return motion.positions
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         return (1.0 + nodes[..., SCALE]) * np.exp(1j * nodes[..., DIRECTION])
@@ -121,20 +112,10 @@ class DvlFactors(OdometryModel):
         slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
         return Drift(values, slopes)
 
-    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        starts = layout.node_start(np.arange(layout.first, layout.last))
-        durations = motion.durations
+    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        durations = np.diff(motion.times)
         self._add_positions(equations, starts, nodes, motion, durations)
-        add_changes(equations, starts, nodes, self._changes(durations))
-
-    def _changes(self, durations: np.ndarray) -> Changes:
-        """Return how the errors of the odometry change from node to node."""
-        own = self._parameters
-        return {
-            YAW: own.compass.change(durations),
-            DIRECTION: walk(own.direction_walk, durations),
-            SCALE: walk(0.0, durations),
-        }
+        add_changes(equations, starts, nodes, durations, self._walks, {YAW: self.compass.change(durations)})
 
     def _add_positions(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion, durations: np.ndarray
@@ -144,40 +125,34 @@ class DvlFactors(OdometryModel):
         Noise is one of the reported velocities, so the residuals are those per unit of scale. The derivative by the
         scale contains that; else the fit would shrink the world to make them smaller.
         """
-        step = np.diff(motion.positions)
+        step, before = np.diff(motion.positions), nodes[:-1]
         one = np.ones(len(starts))
-        yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
-        turned_step = product(np.exp(1j * (nodes[:-1, DIRECTION] + yaw)), step)
-        scaled = (1.0 + nodes[:-1, SCALE]) * turned_step
-        change = np.diff(as_complex(nodes))
-        residual = change - (scaled - step) - self._carried(nodes[:-1], durations)
+        yaw = (before[:, YAW] + nodes[1:, YAW]) / 2.0
+        turned_step = product(np.exp(1j * (before[:, DIRECTION] + yaw)), step)
+        scaled = (1.0 + before[:, SCALE]) * turned_step
         unknown = (_HELD_SPEED * np.diff(motion.held)) ** 2
-        weight = 1.0 / (self._parameters.position_walk**2 * durations + unknown + _ROUNDING_VARIANCE)
+        weight = 1.0 / (self.position_walk**2 * durations + unknown + _ROUNDING_VARIANCE)
         for axis, part in ((0, np.real), (1, np.imag)):
-            places = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *self._carriers(axis))
+            carriers = [CURRENT_X + axis] * self._carriers
+            carried = before[:, carriers].sum(axis=1) * durations
+            residual = np.diff(nodes[:, axis]) - part(scaled - step) - carried
             by_angle = -part(1j * scaled)
-            slopes = (one, -one, by_angle, -part(turned_step) - part(residual), by_angle / 2.0, by_angle / 2.0)
-            slopes += tuple(-durations for _ in self._carriers(axis))
-            columns = starts[:, np.newaxis] + np.array(places)
-            equations.add(columns, np.column_stack(slopes), part(residual), weight)
-
-    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
-        """Return the moves (n,) x + i y [m] in map that the odometry cannot feel."""
-        return np.zeros(len(nodes), dtype=np.complex128)
-
-    def _carriers(self, axis: int) -> tuple:
-        """Return the columns of the velocities that make those moves along an axis."""
-        return ()
+            slopes = (one, -one, by_angle, -part(turned_step) - residual, by_angle / 2.0, by_angle / 2.0)
+            slopes += (-durations,) * self._carriers
+            columns = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *carriers)
+            equations.add(starts[:, np.newaxis] + np.array(columns), np.column_stack(slopes), residual, weight)
 
 
 class ThrusterFactors(DvlFactors):
     """Nodes have columns x, y, yaw, direction [rad] and scale as DvlFactors, and the current x, y in map [m/s]."""
 
     width = 7
+    _carriers = 1
 
     def __init__(self, parameters: ThrusterOdometry) -> None:
         super().__init__(parameters)
-        self._own = parameters
+        self._own, current = parameters, parameters.current_walk
+        self._walks.update({SCALE: parameters.scale_walk, CURRENT_X: current, CURRENT_Y: current})
 
     @property
     def freed(self) -> "ThrusterFactors":
@@ -203,17 +178,6 @@ class ThrusterFactors(DvlFactors):
         values[:2] = to_base @ node[_CURRENT]
         slopes[:2, _CURRENT] = to_base
         return Drift(values, slopes)
-
-    def _changes(self, durations: np.ndarray) -> Changes:
-        own, current = self._own, walk(self._own.current_walk, durations)
-        changed = {SCALE: walk(own.scale_walk, durations), CURRENT_X: current, CURRENT_Y: current}
-        return {**super()._changes(durations), **changed}
-
-    def _carried(self, nodes: np.ndarray, durations: np.ndarray) -> np.ndarray:
-        return as_complex(nodes[:, _CURRENT]) * durations
-
-    def _carriers(self, axis: int) -> tuple:
-        return (CURRENT_X + axis,)
 
 
 class OdometryDoubt(NamedTuple):
@@ -245,14 +209,14 @@ class UnsureFactors(ThrusterFactors):
         super().__init__(
             ThrusterOdometry(**own, scale_walk=0.0, current_deviation=doubt.current_deviation, current_walk=0.0)
         )
-        self._rival = DvlFactors(dvl)
+        self.rival = DvlFactors(dvl)
         still, flowing = doubt.no_current, doubt.current_deviation
         share = (1.0 - doubt.dvl_share) / 2.0
         components = (
             PriorComponent("THRUSTERS", share, np.array([doubt.scale_deviation, still, still])),
             PriorComponent("THRUSTERS in a current", share, np.array([doubt.scale_deviation, flowing, flowing])),
         )
-        self._mixture = PriorMixture(
+        self.mixture = PriorMixture(
             columns=(SCALE, CURRENT_X, CURRENT_Y),
             mean=np.array([dvl.scale, 0.0, 0.0]),
             widest=components[-1].deviations,
@@ -261,11 +225,3 @@ class UnsureFactors(ThrusterFactors):
             components=components,
             rival=PriorComponent("DVL", doubt.dvl_share, np.array([dvl.scale_deviation, still, still])),
         )
-
-    @property
-    def mixture(self) -> PriorMixture:
-        return self._mixture
-
-    @property
-    def rival(self) -> DvlFactors:
-        return self._rival

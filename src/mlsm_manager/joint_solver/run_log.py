@@ -21,23 +21,25 @@ class PointTable:
     """The points of scans 0, 1, ... in the order of time."""
 
     def __init__(self) -> None:
-        self._starts: List[int] = [0]
+        self._starts = GrowingArray(kind=np.int64)
+        self._starts.extend([0])
         self._table = GrowingTable(**{name: (2,) if name == "normals" else () for name in (*_OF_POINTS, "scans")})
 
     @property
     def scan_count(self) -> int:
         """Number of scans so far."""
-        return len(self._starts) - 1
+        return len(self._starts.values) - 1
 
     @property
     def counts(self) -> np.ndarray:
         """(scan_count,) int, number of points of each scan."""
-        return np.diff(self._starts)
+        return np.diff(self._starts.values)
 
     def append(self, points: SurfacePoints) -> None:
         """Append the points of one scan."""
-        self._table.extend(**vars(points), scans=np.full(len(points.times), self.scan_count))
-        self._starts.append(self._starts[-1] + len(points))
+        count = len(points.times)
+        self._table.extend(**vars(points), scans=np.full(count, self.scan_count))
+        self._starts.extend([self._starts.values[-1] + count])
 
     def since(
         self, scan: int, change: Callable[[SurfacePoints], SurfacePoints] = lambda points: points
@@ -50,18 +52,24 @@ class PointTable:
 
     def shorten(self, scans: int) -> None:
         """Keep the oldest `scans`."""
-        del self._starts[scans + 1 :]
-        self._table.shorten(self._starts[-1])
+        self._starts.shorten(scans + 1)
+        self._table.shorten(self._starts.values[-1])
 
     def forget(self, scans: np.ndarray) -> None:
         """Forget the points of `scans` (n,) bool, one for each scan so far."""
         counts = self.counts
         self._table.keep(np.repeat(~scans, counts))
-        self._starts = [0, *np.cumsum(np.where(scans, 0, counts)).tolist()]
+        self._starts.values[1:] = np.cumsum(np.where(scans, 0, counts))
 
     def rows(self, first: int, last: int) -> np.ndarray:
         """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
-        return np.arange(self._starts[first], self._starts[last])
+        return np.arange(self._starts.values[first], self._starts.values[last])
+
+    def rows_of(self, scans: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the rows (n,) of the points of `scans` (s,) int, one scan after the other, and how many (s,)."""
+        starts, ends = self._starts.values[scans], self._starts.values[scans + 1]
+        counts = ends - starts
+        return np.repeat(ends - np.cumsum(counts), counts) + np.arange(counts.sum()), counts
 
     def points(self, rows: np.ndarray) -> Tuple[SurfacePoints, np.ndarray]:
         """Return the points in `rows` (n,) int, and the scan (n,) int of each."""
@@ -73,7 +81,8 @@ class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
     sonar_in_base: (2,) m. surfaces: points on surfaces. posts: echoes of what is small. Points of scans may be
-    forgotten; the nodes stay.
+    forgotten; the nodes stay. scan_count: so far. node_times: (scan_count + 1,) s, a view that the next scan makes
+    invalid; empty before the first scan.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -81,25 +90,16 @@ class RunLog:
         self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryLog()
         self._node_times = GrowingArray()
+        self.scan_count, self.node_times = 0, self._node_times.values
         self.surfaces, self.posts = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []
         self._forgotten = GrowingArray(kind=bool)
         self._points_and_echoes = GrowingArray(2)
 
     @property
-    def scan_count(self) -> int:
-        """Number of scans so far."""
-        return self.surfaces.scan_count
-
-    @property
     def forgotten(self) -> np.ndarray:
         """(scan_count,) bool, scans whose points are forgotten; a view."""
         return self._forgotten.values
-
-    @property
-    def node_times(self) -> np.ndarray:
-        """(scan_count + 1,) s; a view that the next scan makes invalid."""
-        return self._node_times.values
 
     @property
     def point_counts(self) -> np.ndarray:
@@ -131,9 +131,9 @@ class RunLog:
         sights = Sights.of(scan, self.sonar_in_base)
         points = SurfacePoints.of(scan, sights)
         posts = post_points(scan, sights, points)
-        if not len(self._node_times):
+        if not len(self._node_times.values):
             self._node_times.extend([min(scan.start, scan.reference_time - _SHORTEST_SCAN)])
-        newest = self.node_times[-1]
+        newest = self._node_times.values[-1]
         if scan.reference_time <= newest:
             text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
             raise RefusedInput("scans out of order", text)
@@ -144,6 +144,11 @@ class RunLog:
         self._points_and_echoes.extend(np.array([[len(scan.points), sights.echo_count]]))
         self.surfaces.append(points)
         self.posts.append(posts)
+        self._count()
+
+    def _count(self) -> None:
+        """Learn how many scans there are now."""
+        self.scan_count, self.node_times = self.surfaces.scan_count, self._node_times.values
 
     def shorten(self, scans: int) -> None:
         """Keep the oldest `scans`, as if the others had not been."""
@@ -155,6 +160,7 @@ class RunLog:
         del self._odometry_lengths[scans:]
         # Without scans no node is known: the next scan begins the run.
         self._node_times.shorten(scans + 1 if scans else 0)
+        self._count()
 
     def forget(self, scans: np.ndarray) -> None:
         """Forget the points of `scans` (n,) bool, those of each scan so far."""
@@ -180,6 +186,7 @@ class RunLog:
         later.surfaces, later.posts = self.surfaces.since(scan), self.posts.since(scan)
         later._forgotten.extend(self.forgotten[scan:])
         later._points_and_echoes.extend(self._points_and_echoes.values[scan:])
+        later._count()
         return later
 
     def heard_as(self, change: Callable[[SurfacePoints], SurfacePoints], sonar_in_base: np.ndarray) -> "RunLog":

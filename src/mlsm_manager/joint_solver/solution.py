@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.motion_models import OdometryModel
 from mlsm_manager.joint_solver.normal_equations import DELAY, RANGE_SCALE, YAW, Layout, NormalEquations, State
-from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import NO_POINTS, PlacedPoints, path_rows, placed_rows
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
@@ -75,12 +75,17 @@ class Submaps:
         joined = self.newest
         self._numbers = [MAP if number == joined else number for number in self._numbers]
 
-    def within(self, pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> Pairs:
+    def within(
+        self, met: List[Tuple[Pairs, PlacedPoints, PlacedPoints]]
+    ) -> List[Tuple[Pairs, PlacedPoints, PlacedPoints]]:
         """Return the comparisons of points of one submap; what was in the map before the run is of the map."""
         if not any(self._numbers):
-            return pairs
-        same = self._of(sources.scans[pairs.rows]) == self._of(targets.scans[pairs.neighbours])
-        return Pairs(pairs.rows[same], pairs.neighbours[same], pairs.importance[same])
+            return met
+        found = []
+        for pairs, sources, targets in met:
+            same = self._of(sources.scans[pairs.rows]) == self._of(targets.scans[pairs.neighbours])
+            found.append((Pairs(*(each[same] for each in pairs)), sources, targets))
+        return found
 
     def _of(self, scans: np.ndarray) -> np.ndarray:
         return np.where(scans < 0, MAP, self.numbers[scans])
@@ -199,10 +204,10 @@ class Solution:
         (points, scans), log, state = table.points(rows), self.log, self.state
         times = points.times + state.run[DELAY]
         nodes = np.unique(np.concatenate([scans, scans + 1]))
-        known = log.odometry.between(times.min() - _HALF_SECOND, times.max() + _HALF_SECOND)
         heard = times, np.searchsorted(nodes, scans), points.ranges, points.bearings
-        legs = _legs(log.odometry, self.odometry, log.node_times[nodes], state.nodes[nodes])
-        knots, scale = _knots(self.odometry, known), float(state.run[RANGE_SCALE])
+        around = times.min() - _HALF_SECOND, times.max() + _HALF_SECOND
+        legs, knots = _path(log.odometry, self.odometry, log.node_times[nodes], state.nodes[nodes], around)
+        scale = float(state.run[RANGE_SCALE])
         found = placed_rows(heard, points.normals, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
         return PlacedPoints(
             scans=scans, places=found[:, 0:2], arms=found[:, 2:4], normals=found[:, 4:6], slants=points.slants,
@@ -242,23 +247,24 @@ def solved_path(
     first, last = np.searchsorted(node_times, [times.min(), times.max()])
     near = slice(max(min(first, len(node_times) - 1) - 1, 0), last + 1)
     node_times, nodes = node_times[near], nodes[near]
-    known = log.between(min(times.min(), node_times[-1]), max(times.max(), node_times[0]))
-    return path_rows(times, _legs(log, odometry, node_times, nodes), _knots(odometry, known))
+    around = min(times.min(), node_times[-1]), max(times.max(), node_times[0])
+    return path_rows(times, *_path(log, odometry, node_times, nodes, around))
 
 
-def _legs(log: OdometryLog, odometry: OdometryModel, times: np.ndarray, nodes: np.ndarray) -> np.ndarray:
-    """Return the nodes (n, 8) as compiled loops take them; times: (n,) s. nodes: (n, width).
+def _path(
+    log: OdometryLog, odometry: OdometryModel, times: np.ndarray, nodes: np.ndarray, around: Tuple[float, float]
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the nodes (n, 8), and poses of the odometry between two times (k, 4), as compiled loops take them.
 
-    Between two of them the path is the model's reference path, turned and scaled by the mean of their gains, and
-    stretched to lead from one to the other. The last gain is that with which it goes on.
+    times: (n,) s. nodes: (n, width). Between two nodes the path is the model's reference path, which is even between
+    the poses, turned and scaled by the mean of both gains, and stretched to lead from one to the other. The last gain
+    is that with which it goes on.
     """
-    motion = log.motion(times)
-    places, reference, gain = motion.poses[:, :2] + nodes[:, :2], odometry.reference(motion), odometry.gain(nodes)
+    motion, known = log.path(times, *around)
+    places, gain = motion.poses[:, :2] + nodes[:, :2], odometry.gain(nodes)
     gain[:-1] = (gain[:-1] + gain[1:]) / 2.0
-    return np.column_stack([times, places, nodes[:, YAW], reference.real, reference.imag, gain.real, gain.imag])
-
-
-def _knots(odometry: OdometryModel, known: Motion) -> np.ndarray:
-    """Return poses of the odometry (k, 4) as compiled loops take them: a reference path is even between them."""
-    reference = odometry.reference(known)
-    return np.column_stack([known.times, known.poses[:, YAW], reference.real, reference.imag])
+    at_nodes, at_poses = ((path.real, path.imag) for path in (odometry.reference(motion), odometry.reference(known)))
+    return (
+        np.column_stack([times, places, nodes[:, YAW], *at_nodes, gain.real, gain.imag]),
+        np.column_stack([known.times, known.poses[:, YAW], *at_poses]),
+    )

@@ -1,7 +1,7 @@
 """Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, Optional
+from typing import Callable, Dict
 
 import numpy as np
 
@@ -10,12 +10,10 @@ from mlsm_manager.joint_solver.motion_models import (
     FIXED_DEVIATION,
     HELD_DEVIATION,
     Change,
-    Changes,
     Compass,
     Drift,
     OdometryModel,
     add_changes,
-    walk,
 )
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
@@ -76,15 +74,11 @@ class HeadingFactors(OdometryModel):
     position_walk = np.inf
 
     def __init__(self, parameters: HeadingOdometry) -> None:
-        self._speeds, self._compass = parameters.speeds, parameters.compass
-
-    @property
-    def compass(self) -> Optional[Compass]:
-        return self._compass
+        self._speeds, self.compass = parameters.speeds, parameters.compass
 
     @property
     def freed(self) -> "HeadingFactors":
-        return HeadingFactors(HeadingOdometry(self._speeds, self._compass.freed))
+        return HeadingFactors(HeadingOdometry(self._speeds, self.compass.freed))
 
     def first_node(self) -> np.ndarray:
         return np.zeros(self.width)
@@ -128,14 +122,15 @@ class HeadingFactors(OdometryModel):
             np.array([own.speed_correlation_time, own.slip_correlation_time, np.inf]),
         )
 
-    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        starts = layout.node_start(np.arange(layout.first, layout.last))
+    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        durations = np.diff(motion.times)
         self._add_positions(equations, starts, nodes, motion)
-        add_changes(equations, starts, nodes, self._changes(motion.durations))
-        self._add_speeds_ahead(equations, starts, nodes, motion.durations)
+        walks = {TRAVEL: self._speeds.travel_walk}
+        add_changes(equations, starts, nodes, durations, walks, self._changes(durations))
+        self._add_speeds_ahead(equations, starts, nodes, durations)
 
     def _first_heading(self) -> float:
-        return self._compass.heading_deviation
+        return self.compass.heading_deviation
 
     def _kept(self, durations: np.ndarray) -> tuple:
         """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
@@ -143,14 +138,14 @@ class HeadingFactors(OdometryModel):
             -durations / self._speeds.slip_correlation_time
         )
 
-    def _changes(self, durations: np.ndarray) -> Changes:
-        """Return how the errors of the compass, the speed aside and the speed of travel change from node to node."""
-        return {YAW: self._compass.change(durations), **self._changes_of_speeds(durations)}
+    def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
+        """Return how the speed aside, and the error of the compass or the turn rate, change from node to node."""
+        _, slipping = self._kept(durations)
+        aside = Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))
+        return {**self._changes_of_heading(durations), ASIDE: aside}
 
-    def _changes_of_speeds(self, durations: np.ndarray) -> Changes:
-        own, (_, slipping) = self._speeds, self._kept(durations)
-        aside = Change(slipping, own.slip_deviation**2 * (1.0 - slipping**2))
-        return {TRAVEL: walk(own.travel_walk, durations), ASIDE: aside}
+    def _changes_of_heading(self, durations: np.ndarray) -> Dict[int, Change]:
+        return {YAW: self.compass.change(durations)}
 
     def _add_speeds_ahead(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
@@ -168,7 +163,7 @@ class HeadingFactors(OdometryModel):
         ahead = product(np.exp(1j * yaw), np.diff(self.reference(motion)))
         step = product((speeds[:-1] + speeds[1:]) / 2.0, ahead)
         residual = np.diff(as_complex(nodes)) + np.diff(motion.positions) - step
-        weight = 1.0 / (self._step_variance(motion.durations) + _ROUNDING_VARIANCE)
+        weight = 1.0 / (self._step_variance(np.diff(motion.times)) + _ROUNDING_VARIANCE)
         one, own = np.ones(len(starts)), np.array([AHEAD, ASIDE, YAW])
         for axis, part in ((0, np.real), (1, np.imag)):
             places = np.concatenate([[self.width + axis, axis], own, self.width + own])
@@ -194,10 +189,6 @@ class UnaidedFactors(HeadingFactors):
 
     def __init__(self, parameters: UnaidedOdometry) -> None:
         self._speeds, self._own = parameters.speeds, parameters
-
-    @property
-    def compass(self) -> None:
-        return None
 
     @property
     def freed(self) -> None:
@@ -233,16 +224,13 @@ class UnaidedFactors(HeadingFactors):
     def _first_heading(self) -> float:
         return FIXED_DEVIATION * 10.0
 
-    def _changes(self, durations: np.ndarray) -> Changes:
-        own = self._own
-        kept = np.exp(-durations / own.turn_rate_correlation_time)
-        turn_rate = Change(kept, own.turn_rate_deviation**2 * (1.0 - kept**2))
-        return {TURN_RATE: turn_rate, **self._changes_of_speeds(durations)}
+    def _changes_of_heading(self, durations: np.ndarray) -> Dict[int, Change]:
+        kept = np.exp(-durations / self._own.turn_rate_correlation_time)
+        return {TURN_RATE: Change(kept, self._own.turn_rate_deviation**2 * (1.0 - kept**2))}
 
-    def add_steps(self, equations: NormalEquations, layout: Layout, nodes: np.ndarray, motion: Motion) -> None:
-        super().add_steps(equations, layout, nodes, motion)
-        own, durations = self._own, motion.durations
-        starts = layout.node_start(np.arange(layout.first, layout.last))
+    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+        super().add_steps(equations, starts, nodes, motion)
+        own, durations = self._own, np.diff(motion.times)
         places = np.array([self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE])
         one, half = np.ones(len(starts)), durations / 2.0
         residual = np.diff(nodes[:, YAW]) - half * (nodes[1:, TURN_RATE] + nodes[:-1, TURN_RATE])

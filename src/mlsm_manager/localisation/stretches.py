@@ -86,7 +86,7 @@ class Stretches:
     @property
     def block_count(self) -> int:
         """How many blocks the closed stretches hold."""
-        return sum(len(one.drawn) for one in self._closed)
+        return sum(len(one.drawn.rows) for one in self._closed)
 
     def _join_two(self) -> None:
         """Join two neighbours with few keyframes and many after them: what bends is mostly the newest path."""

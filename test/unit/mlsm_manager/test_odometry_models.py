@@ -47,7 +47,7 @@ def some_nodes(model, seed=2):
 def equations_of(model, nodes):
     layout = Layout(0, 2, model.width)
     equations = NormalEquations(layout.size)
-    model.add_steps(equations, layout, nodes, MOTION)
+    model.add_steps(equations, layout.step_starts, nodes, MOTION)
     return equations
 
 
@@ -101,7 +101,7 @@ def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
     elsewhere[:, :2] += POSES[:, :2] - positions
     other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead, MOTION.held)
     there = NormalEquations(Layout(0, 2, model.width).size)
-    model.add_steps(there, Layout(0, 2, model.width), elsewhere, other)
+    model.add_steps(there, Layout(0, 2, model.width).step_starts, elsewhere, other)
     np.testing.assert_allclose(there.gradient, equations_of(model, nodes).gradient, rtol=1e-9, atol=1e-9)
 
 
@@ -145,7 +145,7 @@ def test_while_positions_are_held_nobody_knows_how_far_the_vehicle_goes(kind):
     nodes = model.first_node() + np.array([[0.0], [4.0], [4.0]]) * np.eye(model.width)[0]
     held = Motion(TIMES, POSES, MOTION.ahead, np.array([0.0, 14.0, 14.0]))
     reported, told = NormalEquations(Layout(0, 2, model.width).size), equations_of(model, nodes)
-    model.add_steps(reported, Layout(0, 2, model.width), nodes, held)
+    model.add_steps(reported, Layout(0, 2, model.width).step_starts, nodes, held)
     assert told.cost > 5.0 * reported.cost
 
 
