@@ -25,8 +25,6 @@ ODOMETRY = "odometry"
 """Name under which the name of a run's model is stored."""
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
-_CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
-_PULLED_STEPS = 5  # with the pull of loops: comparisons meet by then
 _FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
 _CONVINCING = 10.0  # of log likelihood, by which a path with a loop must fit better
 
@@ -255,12 +253,7 @@ class LiveSolver:
     def _fitted(self, bend: Optional[Bend] = None) -> LiveWindow:
         """Return the newest nodes' problem after they were moved to its solution; loops only pull them near."""
         window = LiveWindow(self.solution, self.estimates, self._frozen.covariances, self._start)
-        cut = self.parameters.wide_cut
-        for _ in range(_PULLED_STEPS if bend else 0):
-            window.step(cut, bend)
-        for _ in range(self.parameters.live_iterations):
-            window.step(cut)
-            cut = max(self.parameters.cut, _CUT_FACTOR * cut)
+        window.fit(bend)
         return window
 
     @property

@@ -1,6 +1,6 @@
 """The problem of one scan: the newest nodes against each other and against the nearest groups of frozen scans."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -38,6 +38,8 @@ _NO_DISTANCE = 1e-9  # m: keeps groups at one place from dividing by zero
 _FORGOTTEN_DELAY = 2.0
 """Inflates the earlier deviation of the delay. Frozen scans keep the delay they were frozen with, so comparing with
 them overstates what is known: windows 41 scans apart settled on 0.68 and 0.86 s where the whole run gives 1.00 s."""
+_CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
+_PULLED_STEPS = 5  # with the pull of loops: comparisons meet by then
 _MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
 
 
@@ -57,7 +59,7 @@ class FrozenMap:
 
     def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
         """Return the points with the run's unknowns at `run` (2,), to first order."""
-        return self.points.moved_by_run(run - self.run)
+        return replace(self.points, places=self.points.places + self.points.by_run @ (run - self.run))
 
 
 def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> FrozenMap:
@@ -183,7 +185,16 @@ class LiveWindow:
         middles = self._frozen.numbers * self._scans_per_group + self._scans_per_group // 2
         return joint_covariance(covariances[np.append(middles, first)])
 
-    def step(self, cut: float, bend: Optional[Bend] = None) -> None:
+    def fit(self, bend: Optional[Bend] = None) -> None:
+        """Move the free nodes to the solution; the loops of a bend only pull them near."""
+        cut = self._parameters.wide_cut
+        for _ in range(_PULLED_STEPS if bend else 0):
+            self._step(cut, bend)
+        for _ in range(self._parameters.live_iterations):
+            self._step(cut)
+            cut = max(self._parameters.cut, _CUT_FACTOR * cut)
+
+    def _step(self, cut: float, bend: Optional[Bend] = None) -> None:
         """Take one Gauss-Newton step with points up to `cut` [m] apart; the loops of a bend pull."""
         equations = NormalEquations(self._layout.size, len(self._held_covariance))
         self._add_beliefs(equations)
@@ -206,16 +217,12 @@ class LiveWindow:
         return self._solution.covariances(columns[np.newaxis], self._held_covariance)[1][0]
 
     def _add_beliefs(self, equations: NormalEquations) -> None:
-        layout, (mean, deviations) = self._layout, self._beliefs
+        layout, (mean, deviations), held = self._layout, self._beliefs, ()
         value = np.append(self._state.nodes[layout.first], self._state.run)
         if layout.first:
             mean = np.append(value[POSE], mean[POSE_COLUMNS:])
-            own = np.arange(POSE_COLUMNS)
-            held = layout.size + len(self._held_covariance) - POSE_COLUMNS + own
-            cross = np.zeros((POSE_COLUMNS, 2, 2))
-            cross[:, 0, 1] = cross[:, 1, 0] = -(deviations[POSE] ** -2.0)
-            equations.add_terms(np.column_stack([own, held]), cross, np.zeros((POSE_COLUMNS, 2)))
-        equations.add_prior(self._believed_columns, value, mean, deviations)
+            held = layout.size + len(self._held_covariance) - POSE_COLUMNS + np.arange(POSE_COLUMNS)
+        equations.add_prior(self._believed_columns, value, mean, deviations, held)
 
     def _beliefs_before(self, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
         """Return mean and deviations, (width + 2,) each, of the run's first node and of the run's unknowns."""

@@ -9,7 +9,7 @@ from typing import Callable, Dict, Mapping, NamedTuple, Optional, Protocol
 
 import numpy as np
 
-from mlsm_manager.joint_solver.normal_equations import POSE, NormalEquations
+from mlsm_manager.joint_solver.normal_equations import POSE, YAW, NormalEquations
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.prior_mixture import PriorMixture
 from mlsm_manager.scan_matching.prediction import Fading
@@ -153,14 +153,17 @@ class Compass:
 
 def add_changes(
     equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray,
-    walks: Mapping[int, float], changes: Mapping[int, Change],
+    walks: Mapping[int, float], changes: Mapping[int, Change], compass: Optional[Compass],
 ) -> None:  # fmt: skip
     """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width).
 
     Both by columns of a node. walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others.
+    compass: that of which YAW is the error; None without one.
     """
     one = np.ones(len(durations))
     changes = {**changes, **{column: Change(one, each**2 * durations) for column, each in walks.items()}}
+    if compass is not None:
+        changes[YAW] = compass.change(durations)
     columns, values = np.array(list(changes))[:, np.newaxis], nodes[:, list(changes)].T
     kept, variances = (np.stack(each) for each in zip(*changes.values()))
     places = np.stack([starts + nodes.shape[1] + columns, starts + columns], axis=-1)

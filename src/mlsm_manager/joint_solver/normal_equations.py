@@ -5,7 +5,7 @@ pose plus x, y and yaw. An odometry model may add columns of its own. The run's 
 """
 
 from dataclasses import dataclass, field
-from typing import Tuple, Union
+from typing import Sequence, Tuple, Union
 
 import numpy as np
 import scipy.linalg
@@ -112,10 +112,17 @@ class NormalEquations:
         )
         self.cost += float(np.sum(weight * residual**2))
 
-    def add_prior(self, columns: np.ndarray, value: np.ndarray, mean: np.ndarray, deviation: np.ndarray) -> None:
-        """Add that unknowns in `columns` (m,), at `value` (m,), are `mean` (m,) but for `deviation` (m,)."""
-        weight = np.maximum(deviation, _HELD_DEVIATION) ** -2.0
-        self.add(columns[:, np.newaxis], np.ones((len(value), 1)), value - mean, weight)
+    def add_prior(
+        self, columns: np.ndarray, value: np.ndarray, mean: np.ndarray, deviation: np.ndarray,
+        held: Sequence[int] = (),
+    ) -> None:  # fmt: skip
+        """Add that unknowns in `columns` (m,), at `value` (m,), are `mean` (m,) but for `deviation` (m,).
+
+        held: columns of held unknowns with which the means of the first ones go.
+        """
+        weight, pairs = np.maximum(deviation, _HELD_DEVIATION) ** -2.0, np.full((len(value), 2), -1)
+        pairs[:, 0], pairs[: len(held), 1] = columns, held
+        self.add(pairs, np.tile([1.0, -1.0], (len(value), 1)), value - mean, weight)
 
     def add_terms(self, columns: np.ndarray, information: np.ndarray, gradient: np.ndarray) -> None:
         """Add m sums: columns (m, c) as in `add`, information (m, c, c), gradient (m, c)."""

@@ -1,6 +1,6 @@
 """Where points of scans lie in the map, in a loop that is compiled on import: never while a scan waits."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from typing import Union
 
 import numpy as np
@@ -144,11 +144,6 @@ class PlacedPoints:
 
     def __len__(self) -> int:
         return len(self.scans)
-
-    def moved_by_run(self, change: np.ndarray) -> "PlacedPoints":
-        """Return the points after the run's unknowns changed a little, by `change` (2,), to first order."""
-        places = self.places + self.by_run @ change
-        return replace(self, places=places)
 
     def selected(self, rows: Union[np.ndarray, slice]) -> "PlacedPoints":
         """Return the points in `rows`: indices, (n,) bool, or a slice, which copies nothing."""

@@ -126,7 +126,7 @@ class HeadingFactors(OdometryModel):
         durations = np.diff(motion.times)
         self._add_positions(equations, starts, nodes, motion)
         walks = {TRAVEL: self._speeds.travel_walk}
-        add_changes(equations, starts, nodes, durations, walks, self._changes(durations))
+        add_changes(equations, starts, nodes, durations, walks, self._changes(durations), self.compass)
         self._add_speeds_ahead(equations, starts, nodes, durations)
 
     def _first_heading(self) -> float:
@@ -139,13 +139,9 @@ class HeadingFactors(OdometryModel):
         )
 
     def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
-        """Return how the speed aside, and the error of the compass or the turn rate, change from node to node."""
+        """Return how unknowns change from node to node that do not only walk."""
         _, slipping = self._kept(durations)
-        aside = Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))
-        return {**self._changes_of_heading(durations), ASIDE: aside}
-
-    def _changes_of_heading(self, durations: np.ndarray) -> Dict[int, Change]:
-        return {YAW: self.compass.change(durations)}
+        return {ASIDE: Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))}
 
     def _add_speeds_ahead(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
@@ -224,9 +220,10 @@ class UnaidedFactors(HeadingFactors):
     def _first_heading(self) -> float:
         return FIXED_DEVIATION * 10.0
 
-    def _changes_of_heading(self, durations: np.ndarray) -> Dict[int, Change]:
+    def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
         kept = np.exp(-durations / self._own.turn_rate_correlation_time)
-        return {TURN_RATE: Change(kept, self._own.turn_rate_deviation**2 * (1.0 - kept**2))}
+        turn_rate = Change(kept, self._own.turn_rate_deviation**2 * (1.0 - kept**2))
+        return {TURN_RATE: turn_rate, **super()._changes(durations)}
 
     def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         super().add_steps(equations, starts, nodes, motion)
