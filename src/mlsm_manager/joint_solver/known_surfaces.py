@@ -11,8 +11,7 @@ from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.surface_points import LEAST_REACH, surface_normals
-from mlsm_manager.surface_map.blocks import cells_of
-from mlsm_manager.surface_map.cells import cell_keys
+from mlsm_manager.surface_map.blocks import cell_keys, cells_of
 
 _CANDIDATES = 3  # blocks that are looked at for each point: more than there usually are as near as the nearest one
 _SQUARE = 32.0

@@ -62,7 +62,7 @@ class LiveSolver:
         self._may_bend = known is None
         self._loops: Tuple[Loop, ...] = ()
         self._by_parts = parameters.node_search
-        self._forgotten_until = 0
+        self._forgotten_until = self._silent = 0
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs, as arrays by name, which the next scan does not change."""
@@ -179,6 +179,7 @@ class LiveSolver:
         Raises RefusedInput, and stays as it is, where the fit has no finite solution.
         """
         scans, before, by_parts, loops = len(self.estimates), self.state.copy(), self._by_parts, self._loops
+        self._silent = silent_scans(self.log)
         for _ in range(scans, self.log.scan_count):
             self.submaps.append()
         try:
@@ -231,7 +232,7 @@ class LiveSolver:
     @property
     def _old_scans(self) -> int:
         """How many scans of the log are so old that they are forgotten, many at once; none of before a silence."""
-        kept = max(self.parameters.kept_scans * self._parts, silent_scans(self.log) + 2 * self._parts)
+        kept = max(self.parameters.kept_scans * self._parts, self._silent + 2 * self._parts)
         return max(self.log.scan_count - kept, 0) // _FORGOTTEN_AT_ONCE * _FORGOTTEN_AT_ONCE
 
     def _forget_old(self) -> None:
@@ -300,9 +301,9 @@ class LiveSolver:
         if self._parts > 1:
             self._search_by_parts()
             return
-        silent = silent_scans(self.log)
-        if len(self.estimates) > silent:
-            self.search = put_newest(self.solution, self.estimates[-1 - silent].own_covariance, silent)
+        if len(self.estimates) > self._silent:
+            covariance = self.estimates[-1 - self._silent].own_covariance
+            self.search = put_newest(self.solution, covariance, self._silent)
 
     def _search_by_parts(self) -> None:
         """Put the newest nodes where the search for nodes finds them likeliest."""

@@ -8,8 +8,7 @@ from typing import Deque, List, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
-from mlsm_manager.surface_map.blocks import Blocks, cells_of
-from mlsm_manager.surface_map.cells import cell_keys, cells_of_keys
+from mlsm_manager.surface_map.blocks import Blocks, cell_keys, cells_of, cells_of_keys
 from mlsm_manager.surface_map.free_space import BeamFindings, Carver, CarveReport, FirstEchoes, pairs_of_groups
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap, Overlay
 

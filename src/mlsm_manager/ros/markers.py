@@ -10,7 +10,7 @@ from std_msgs.msg import ColorRGBA, Header
 from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.surface_map.blocks import Blocks
-from mlsm_manager.surface_map.cells import THINNEST, BoxLists, box_lists, box_size, box_type
+from mlsm_manager.surface_map.boxes import THINNEST, BoxLists, box_lists, box_size, box_type
 from mlsm_manager.surface_map.export.pictures import TYPE_COLORS, ColorBy, Limits, block_colors, color_limits
 
 Tile = Tuple[int, int]

@@ -8,12 +8,22 @@ from weakref import WeakSet
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks
-from mlsm_manager.surface_map.cells import NO_BLOCK, CellIndex
 from node_support.numba_cache import compiled
 
 _PIECE = 1 << 15  # rows copied at once: 3 MB, one or two milliseconds
 _PAUSE = 0.001  # s between two pieces: a lock that is taken again at once is never given to somebody who waits for it
 _MIN_ROWS = 1024  # reserved from the start (96 kB), so that small maps do not grow scan by scan
+
+
+NO_BLOCK = -1
+_EMPTY = np.iinfo(np.int64).min
+_FEWEST_PLACES = 1 << 10
+_MOST_LOAD = 0.75  # share of the places in use from which on the table doubles: a search then takes some steps
+# The golden ratio times 2^64, a prime of xxHash and one of splitmix64: they spread neighbouring cells over the table.
+_MULTIPLIER_X = np.uint64(0x9E3779B97F4A7C15)
+_MULTIPLIER_Y = np.uint64(0xC2B2AE3D27D4EB4F)
+_FINISHER = np.uint64(0xBF58476D1CE4E5B9)
+_HALF, _LOW = np.uint64(32), np.int64(0xFFFFFFFF)
 
 
 class Runs(NamedTuple):
@@ -28,6 +38,93 @@ class Runs(NamedTuple):
     cell: np.ndarray
     crossed: np.ndarray
     changed: np.ndarray
+
+
+class CellIndex:
+    """An open-addressing hash table from cell keys to block numbers.
+
+    A hash and not tiles: walls cross a tile in a line and a far point needs one of its own, so that on real scans
+    tiles spend more memory on empty cells than the blocks themselves take. Doubling takes some hundredths of a second
+    at a million cells.
+
+    heads: (s,) the number of the first block of the cell in each place, NO_BLOCK where there is none.
+    """
+
+    def __init__(self, expected_cells: int) -> None:
+        self._begin(expected_cells)
+
+    def _begin(self, cells: int) -> None:
+        """Begin an empty table with room for so many cells, whose number of places is a power of two."""
+        places = max(_FEWEST_PLACES, 1 << int(np.ceil(cells / _MOST_LOAD)).bit_length())
+        self._keys, self.heads = np.full(places, _EMPTY), np.full(places, NO_BLOCK, dtype=np.int32)
+        self._used = 0
+
+    @property
+    def nbytes(self) -> int:
+        """Memory held, bytes."""
+        return self._keys.nbytes + self.heads.nbytes
+
+    def slots(self, keys: np.ndarray) -> np.ndarray:
+        """Return (n,) int64 places in `heads`, making those that are new; keys is (n,) and holds none twice.
+
+        Places are good until the next call.
+        """
+        most = _MOST_LOAD * len(self._keys)
+        if self._used + len(keys) > most:
+            cells = self._used + np.count_nonzero(_found(keys, self._keys) < 0)
+            if cells > most:
+                self._grow(cells)
+        places, new = _placed(keys, self._keys)
+        self._used += new
+        return places
+
+    def find(self, keys: np.ndarray) -> np.ndarray:
+        """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
+        places = _found(np.ascontiguousarray(keys), self._keys)
+        return np.where(places >= 0, self.heads[places], np.int32(NO_BLOCK))
+
+    def _grow(self, cells: int) -> None:
+        taken = self._keys != _EMPTY
+        keys, heads = self._keys[taken], self.heads[taken]
+        self._begin(cells)
+        places, self._used = _placed(keys, self._keys)
+        self.heads[places] = heads
+
+
+@compiled()
+def _searched(key, held_keys):
+    """Return the place that holds a key, or else the free one that it may take: places are searched in a ring."""
+    x, y = np.uint64(key >> 32), np.uint64(key & _LOW)
+    mixed = x * _MULTIPLIER_X + y * _MULTIPLIER_Y
+    mixed = (mixed ^ (mixed >> _HALF)) * _FINISHER
+    last = len(held_keys) - 1
+    place = np.int64(mixed >> _HALF) & last
+    while held_keys[place] != key and held_keys[place] != _EMPTY:
+        place = (place + 1) & last
+    return place
+
+
+@compiled()
+def _found(keys, held_keys):
+    """Return (n,) the places of `keys` (n,), -1 of those that are not there."""
+    places = np.empty(len(keys), np.int64)
+    for number in range(len(keys)):
+        place = _searched(keys[number], held_keys)
+        places[number] = place if held_keys[place] != _EMPTY else -1
+    return places
+
+
+@compiled()
+def _placed(keys, held_keys):
+    """Return (n,) the places of `keys` (n,), and how many of these are new and took one."""
+    places, new = np.empty(len(keys), np.int64), 0
+    for number in range(len(keys)):
+        place = _searched(keys[number], held_keys)
+        if held_keys[place] == _EMPTY:
+            held_keys[place] = keys[number]
+            new += 1
+        places[number] = place
+    return places, new
 
 
 class BlockStore:

@@ -131,3 +131,14 @@ def all_of(source: BlockSource) -> Blocks:
 def cells_of(points: np.ndarray, resolution: float) -> np.ndarray:
     """Return (n, 2) int64 cell indices of points (n, >= 2), floor(x / r), floor(y / r) as in thesis 6.5.6."""
     return np.floor(points[:, :2] / resolution).astype(np.int64)
+
+
+def cell_keys(cells: np.ndarray) -> np.ndarray:
+    """Return (n,) int64, one key per cell; cells is (n, 2) int64 with |index| < 2**31. Keys sort by x, then by y."""
+    return (cells[:, 0] << 32) + cells[:, 1]
+
+
+def cells_of_keys(keys: np.ndarray) -> np.ndarray:
+    """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
+    low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
+    return np.column_stack([(keys - low) >> 32, low])

@@ -16,8 +16,7 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cells_of
-from mlsm_manager.surface_map.cells import cell_keys
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys, cells_of
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.parameters import ParameterSet, parameter
 

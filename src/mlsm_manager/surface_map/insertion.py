@@ -6,9 +6,8 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.block_store import BlockStore, Runs
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks
-from mlsm_manager.surface_map.cells import NO_BLOCK, cell_keys
+from mlsm_manager.surface_map.block_store import NO_BLOCK, BlockStore, Runs
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys
 from mlsm_manager.surface_map.point_groups import VALUES, Groups, finite_within, grouped_points, sorted_by_cell
 from node_support.numba_cache import compiled
 

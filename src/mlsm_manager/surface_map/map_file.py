@@ -15,8 +15,7 @@ import numpy as np
 
 from georeferencing.origin import STORED, Origin
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks
-from mlsm_manager.surface_map.cells import cell_keys
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks, cell_keys
 from node_support.files import write_whole
 from node_support.marks import Mark
 

@@ -6,12 +6,41 @@ from typing import Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore, RunningCopy
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, TOP, Blocks, cells_of
-from mlsm_manager.surface_map.cells import TILE_BITS, ChangedTiles, cell_keys, cells_of_keys
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, TOP, Blocks, cell_keys, cells_of, cells_of_keys
 from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
 from node_support.geometry import grid
 
 _EXTENT = [0, 1, BOTTOM, TOP]  # columns of a block that tell where it lies
+
+TILE_BITS = 4
+"""A tile has 2 ** 4 = 16 cells on a side: 8 m at 0.5 m. Larger ones repeat more that did not change, smaller ones make
+more markers than rviz draws fluidly."""
+_MOST_PARTS = 64
+"""So many insertions are noted before what they changed is put together; it bounds the memory of a map unasked."""
+
+
+class ChangedTiles:
+    """Collects the keys of tiles; tile (i, j) has the key of `cell_keys`."""
+
+    def __init__(self) -> None:
+        self._tiles, self._cells = np.empty(0, dtype=np.int64), []
+
+    def note(self, keys: np.ndarray) -> None:
+        """Note that cells with `keys` (n,) changed."""
+        self._cells.append(keys)
+        if len(self._cells) > _MOST_PARTS:
+            self._tiles = self._together()
+
+    def take(self) -> np.ndarray:
+        """Return the (n, 2) int64 tiles that changed since the last call, sorted, none twice."""
+        tiles, self._tiles = self._together(), self._tiles[:0]
+        return cells_of_keys(tiles)
+
+    def _together(self) -> np.ndarray:
+        """Return the keys of all tiles noted so far, sorted, and keep no cells any more."""
+        cells, self._cells = self._cells, []
+        tiles = [cell_keys(cells_of_keys(keys) >> TILE_BITS) for keys in cells]
+        return np.unique(np.concatenate([self._tiles, *tiles]))
 
 
 class MultiLevelSurfaceMap:

@@ -9,8 +9,8 @@ from hypothesis import strategies as st
 from made_maps import map_with
 
 from mlsm_manager.surface_map import block_store
-from mlsm_manager.surface_map.block_store import finished
-from mlsm_manager.surface_map.cells import NO_BLOCK, CellIndex, cell_keys
+from mlsm_manager.surface_map.block_store import NO_BLOCK, CellIndex, finished
+from mlsm_manager.surface_map.blocks import cell_keys
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 CLUSTERED = st.integers(-40, 40)

@@ -20,7 +20,7 @@ from visualization_msgs.msg import Marker, MarkerArray
 from mlsm_manager.ros.map_publisher import CLOUD_FIELDS, has_octomap_messages, map_cloud, octomap_message
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
 from mlsm_manager.ros.status_teller import ellipse, status_markers, wrapped_text
-from mlsm_manager.surface_map.cells import THINNEST, TILE_BITS, box_lists, box_size, box_type
+from mlsm_manager.surface_map.boxes import THINNEST, TILE_BITS, box_lists, box_size, box_type
 from mlsm_manager.surface_map.export.formats import octree, write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
 from underwater_map_construction.msg import PositionStatus

@@ -9,7 +9,7 @@ from typing import Optional, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
-from mlsm_manager.surface_map.cells import THINNEST
+from mlsm_manager.surface_map.boxes import THINNEST
 from mlsm_manager.surface_map.export.rasters import elevation
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support.files import write_whole
