@@ -13,8 +13,7 @@ from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_new
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.place_search import put_newest, put_submap, silent_scans
-from mlsm_manager.joint_solver.places import PlaceCandidate
+from mlsm_manager.joint_solver.places import PlaceCandidate, put_newest, put_submap, silent_scans
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog, stacked, unstacked
 from mlsm_manager.joint_solver.solution import Fix, Fixes, Solution, Submaps

@@ -139,8 +139,7 @@ class LiveWindow:
         self._run, self._log, self._state = solution, solution.log, solution.state
         self._odometry, self._parameters = solution.odometry, solution.parameters
         last = self._log.scan_count
-        first = max(0, last - self._parameters.free_nodes)
-        self._scans_per_group = self._parameters.group_scans
+        self._scans_per_group, first = self._parameters.group_scans, max(0, last - self._parameters.free_nodes)
         self._recent = first // self._scans_per_group * self._scans_per_group
         around = solution.node_places(last)
         self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
@@ -200,7 +199,8 @@ class LiveWindow:
         self._add_beliefs(equations)
         free = self._state.nodes[self._layout.first :]
         self._odometry.add_steps(equations, self._starts, free, self._motion)
-        self._run.fixes.add(equations, self._layout, self._motion.poses, free)
+        if self._run.fixes.by_node:
+            self._run.fixes.add(equations, self._layout, self._motion.poses, free)
         met = self._surfaces_met(cut)
         self._comparisons = add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:

@@ -2,15 +2,24 @@
 
 Every place within reach is tried with few points, the best ones again with all and a little aside. A place is certain
 if the points fit there, and at no other place nearly as well.
+
+It is used where the solver's own steps do not reach. A scan whose motion is hardly known is laid on the scans before
+it. After a silence of the sonar it is sought in the whole map, at the places that the motion since then allows; if the
+echoes do not fit at one of them alone, it is better not to know where the vehicle is.
 """
 
 from dataclasses import dataclass
-from typing import List, Tuple
+from typing import List, NamedTuple, Optional, Tuple
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.map_support import Surfaces
+from mlsm_manager.joint_solver.map_support import Surfaces, nearness
+from mlsm_manager.joint_solver.motion_models import Transition
+from mlsm_manager.joint_solver.normal_equations import POSE, RUN_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.placement import PlacedPoints
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import MAP, Solution
 from node_support.geometry import grid
 
 FEWEST_POINTS = 25
@@ -116,3 +125,191 @@ def _refined(sources: PlacedPoints, surfaces: Surfaces, shift: np.ndarray) -> Tu
     shares = surfaces.shares(sources, _moved(sources, shifts))
     best = int(np.argmax(shares))
     return shifts[best], float(shares[best])
+
+
+_KNOWN = 2.0  # deviations of the motion within the cut, and the solver's own steps do
+_SUBMAP_SCANS = 6  # the newest ones of a submap that are looked for: older ones may lie in water that the map has not
+_SUBMAP_POINTS = 400  # of these
+_MOST_CELLS_BESIDE = 12  # on each side of the expected place; bounds the time of a search to a fraction of a second
+_COMPARED_SCANS = 10  # before the newest: a few minutes, in which a vehicle sees the same
+_POST_WEIGHT = 1.0  # log-likelihood of a point that stands alone where another one stood: there are few
+_FEW_POINTS_OF_TURNS = 50  # of it, while many turns are compared
+_KNOWN_TURN = 0.1  # rad, deviation: the solver's own steps find turns of less than twice as much
+_TURN_CELL = 0.08  # rad: moves an echo 20 m away by less than twice a cell
+_LEAST_LEFT = 1e-6  # rad^2: of the heading, once a turn is chosen
+
+
+def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
+    """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin a submap.
+
+    covariance: of the node before the newest scan and the `silent` scans before that, and of the run's unknowns. Return
+    what came of the search in the whole map; None where none was needed.
+    """
+    covariance = covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
+    found = place_after_silence(solution, covariance, silent) if silent else None
+    if found is not None and found.is_certain and not solution.submaps.is_apart:
+        solution.move_newest(_shares_of_move(solution.log, solution.log.scan_count - 1), found.shift)
+    elif found is not None and found.reach > solution.parameters.wide_cut:
+        solution.submaps.begin()
+    else:
+        solution.state.nodes[-1] = searched_node(solution, covariance, solution.submaps.start)
+    return found
+
+
+def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) -> np.ndarray:
+    """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
+
+    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
+    is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
+    covariance asks (correlative search, Olson 2009).
+    """
+    log, state, newest = solution.log, solution.state, solution.state.nodes[-1]
+    last = log.scan_count
+    nodes = np.array([last - 1, last])
+    step = Transition.of(solution.odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
+    if _KNOWN * widest(step[:2, :2]) < solution.parameters.cut:
+        return newest
+    before, own = log.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
+    if not len(before) or not len(own):
+        return newest
+    search = _Search(solution, Surfaces(solution.placed(before), solution.parameters), own)
+    if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
+        state, step = search.turned(state, step)
+    return search.beside(state, step, MOST_POINTS)[1]
+
+
+def silent_scans(log: RunLog) -> int:
+    """Return how many scans before the newest one heard too little to tell a place, one after the other."""
+    return _silent_before(log, log.scan_count - 1)
+
+
+def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
+    """Return where the newest scan was taken, after `silent` scans before it that heard nothing.
+
+    covariance: (width, width) of the node before these. None where the motion since is known well
+    enough, or the scan hears too little itself.
+    """
+    log, parameters = solution.log, solution.parameters
+    last = log.scan_count
+    own, place = log.rows(last - 1, last), _covariance_since(solution, covariance, silent)[:2, :2]
+    if widest(place) * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
+        return None
+    return _best_place(solution, own[:: max(1, len(own) // MOST_POINTS)], place)
+
+
+def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
+    """Put the newest scans, which lie apart from the map, into it if they fit at one place; return what was found.
+
+    They are moved together, with the nodes of the silence before them in part. covariance: (2, 2) m^2 of the place.
+    """
+    log = solution.log
+    last, first = log.scan_count, solution.submaps.start
+    rows = log.rows(max(first, last - _SUBMAP_SCANS), last)
+    found = _best_place(solution, rows[:: max(1, len(rows) // _SUBMAP_POINTS)], covariance)
+    if found.is_certain:
+        solution.move_newest(_shares_of_move(log, first), found.shift)
+        solution.submaps.join()
+    return found
+
+
+def _best_place(solution: Solution, rows: np.ndarray, covariance: np.ndarray) -> PlaceCandidate:
+    """Return where in the map the points in `rows` fit best."""
+    sources = solution.placed(rows)
+    targets = _map_around(solution, sources, REACH * widest(covariance) + solution.parameters.cut)
+    return best_place(covariance, sources, Surfaces(targets, solution.parameters))
+
+
+class _Search(NamedTuple):
+    """What the newest scan is compared with. own: (n,) rows of its points. surfaces: those of earlier scans."""
+
+    solution: Solution
+    surfaces: Surfaces
+    own: np.ndarray
+
+    def beside(self, state: State, step: np.ndarray, most: int) -> Tuple[float, np.ndarray]:
+        """Return the newest node (width,) at the best place near its own, and its log-likelihood.
+
+        step: covariance (width, width) of the node. most: points of the scan that are compared.
+        """
+        solution, parameters = self.solution.with_state(state), self.solution.parameters
+        sources = solution.placed(self.own[:: max(1, len(self.own) // most)])
+        shifts = places_within(step[:2, :2], _MOST_CELLS_BESIDE)
+        support = self.surfaces.support(sources, _with_ends_moved(sources, shifts))
+        found = POINT_WEIGHT * MOST_POINTS / most * support
+        if parameters.post_confidence:
+            found = found + parameters.post_confidence * _POST_WEIGHT * _post_support(solution, shifts)
+        costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
+        best = np.argmax(found - costs)
+        node = state.nodes[-1] + step[:, :2] @ np.linalg.solve(step[:2, :2], shifts[best])
+        return float((found - costs)[best]), node
+
+    def turned(self, state: State, step: np.ndarray) -> Tuple[State, np.ndarray]:
+        """Return the state whose newest node is turned as its scan fits best, and what is open then of `step`."""
+        deviation = np.sqrt(step[YAW, YAW])
+        by_yaw = step[:, YAW] / step[YAW, YAW]
+        left = step - np.outer(by_yaw, step[YAW])
+        left[YAW, YAW] = max(left[YAW, YAW], _LEAST_LEFT)
+        count = int(np.ceil(REACH * deviation / _TURN_CELL))
+        states, scores = [], []
+        for turn in _TURN_CELL * np.arange(-count, count + 1):
+            candidate = state.copy()
+            candidate.nodes[-1] += by_yaw * turn
+            states.append(candidate)
+            scores.append(self.beside(candidate, left, _FEW_POINTS_OF_TURNS)[0] - 0.5 * (turn / deviation) ** 2)
+        return states[int(np.argmax(scores))], left
+
+
+def _with_ends_moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
+    """Return the places (k, n, 2) of points whose scan ends `shifts` (k, 2) beside where it does, and begins there."""
+    return sources.places + sources.shares[:, np.newaxis] * shifts[:, np.newaxis]
+
+
+def _post_support(solution: Solution, shifts: np.ndarray) -> np.ndarray:
+    """Return how many of the newest scan's echoes of posts (k,) lie on earlier ones; see _with_ends_moved."""
+    last, rows = solution.log.scan_count, solution.log.posts.rows
+    sources = solution.placed_posts(rows(last - 1, last))
+    targets = solution.placed_posts(rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
+    if not len(sources) or not len(targets):
+        return np.zeros(len(shifts))
+    places = _with_ends_moved(sources, shifts)
+    distance, _ = cKDTree(targets.places).query(places.reshape(-1, 2), distance_upper_bound=solution.parameters.cut)
+    return (nearness(distance).reshape(places.shape[:2]) * sources.qualities).sum(axis=1)
+
+
+def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -> np.ndarray:
+    """Return that of the newest node (width, width) as seen from the one before `silent` scans and the newest one.
+
+    covariance: (width, width) of that node.
+    """
+    log, nodes, own = solution.log, solution.state.nodes, covariance.copy()
+    own[POSE] = own[:, POSE] = 0.0
+    for node in range(log.scan_count - 1 - silent, log.scan_count):
+        motion = log.node_motion(np.array([node, node + 1]))
+        step = Transition.of(solution.odometry, nodes[node : node + 2], motion)
+        own = step.matrix @ own @ step.matrix.T + step.noise
+    return own
+
+
+def _silent_before(log: RunLog, scan: int) -> int:
+    """Return how many scans before `scan` heard too little to tell a place, one after the other."""
+    heard = np.flatnonzero(log.point_counts[:scan] >= FEWEST_POINTS)
+    return scan - 1 - int(heard[-1]) if len(heard) else scan
+
+
+def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
+    """Return what share (k,) of their move the newest nodes go with the scans from `first` on: in a silence a part."""
+    silent = _silent_before(log, first)
+    times = log.node_times[first - silent :]
+    return np.minimum((times[1:] - times[0]) / (times[silent] - times[0]), 1.0)
+
+
+def _map_around(solution: Solution, sources: PlacedPoints, reach: float) -> PlacedPoints:
+    """Return the points of the map that `sources` can meet if they are moved by up to `reach` [m]."""
+    if not len(sources):
+        return sources
+    scans = np.flatnonzero(solution.submaps.numbers == MAP)
+    rows, _ = solution.log.surfaces.rows_of(scans[scans != sources.scans[-1]])
+    targets = solution.placed(rows)
+    low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
+    targets = targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
+    return targets if solution.known is None else targets.joined_with(solution.known.around(low, high))

@@ -120,18 +120,18 @@ class KeyframeCarving:
         looks = [(number, look.findings) for number, look in enumerate(self._looks) if look is not None]
         if not looks:
             return nothing
-        crossed = np.concatenate([_extents(findings.crossed) for _, findings in looks])
-        keys = np.concatenate([cell_keys(findings.crossed.cells) for _, findings in looks])
+        crossed = Blocks.joined([findings.crossed for _, findings in looks])
+        keys = cell_keys(crossed.cells)
         beams = np.concatenate([findings.beams for _, findings in looks])
         number = np.repeat([number for number, _ in looks], [len(findings.beams) for _, findings in looks])
         counts = number > self._last_hit(keys)
-        keys, crossed, beams = keys[counts], crossed[counts], beams[counts]
+        keys, crossed, beams = keys[counts], crossed.take(counts), beams[counts]
         order = np.argsort(keys, kind="stable")
         cells, starts = np.unique(keys[order], return_index=True)
         blocks, rows, owners = surface_map.find(cells_of_keys(cells))
         block, entry = pairs_of_groups(starts, len(keys), owners)
         entry = order[entry]
-        same = (crossed[entry, 0] <= blocks.height[block]) & (crossed[entry, 1] >= blocks.bottom[block])
+        same = blocks.take(block).gaps(crossed, entry) <= 0.0
         more = np.bincount(block[same], weights=beams[entry[same]], minlength=len(blocks))
         return rows[(more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)]
 
@@ -152,10 +152,6 @@ class KeyframeCarving:
 def _moved(look: Optional[_Look], points: np.ndarray) -> float:
     """Return by how many metres the keyframe has moved at most; infinity for one that was never looked at."""
     return np.inf if look is None else float(np.abs(points - look.points)[:, :2].max(initial=0.0))
-
-
-def _extents(blocks: Blocks) -> np.ndarray:
-    return np.column_stack([blocks.bottom, blocks.height])
 
 
 def _newest_hits(points: List[np.ndarray], resolution: float) -> Tuple[np.ndarray, np.ndarray]:

@@ -41,8 +41,7 @@ class _Stretch:
         """Return it without blocks of which the map holds nothing any more, because beams went through them."""
         there, _, owners = surface_map.find(self.drawn.cells)
         drawn, holds = self.drawn, np.zeros(len(self.drawn), dtype=bool)
-        overlap = (there.bottom <= drawn.height[owners]) & (there.height >= drawn.bottom[owners])
-        holds[owners[overlap]] = True
+        holds[owners[there.gaps(drawn, owners) <= 0.0]] = True
         return _Stretch(self.keyframes, self.time, self.pose, drawn.take(holds), self.free)
 
 

@@ -106,6 +106,10 @@ class Blocks:
         """Whether heights tell nothing: all points are within one cell's side in z, as where a sonar scans level."""
         return not len(self) or float(self.height.max() - self.bottom.min()) < self.resolution
 
+    def gaps(self, others: "Blocks", rows: np.ndarray) -> np.ndarray:
+        """Return the height (n,) [m] between each block and one of others, in `rows` (n,); up to 0 where they meet."""
+        return np.maximum(self.bottom - others.height[rows], others.bottom[rows] - self.height)
+
     def take(self, chosen: np.ndarray) -> "Blocks":
         """Return the blocks at `chosen`, a mask (n,) or indices (k,)."""
         return Blocks(self.rows[chosen], self.resolution, self.crossed[chosen])

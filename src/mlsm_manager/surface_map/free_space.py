@@ -249,9 +249,8 @@ def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> Blocks:
     Return these.
     """
     there, _, owners = free.find(noted.cells)
-    gap = np.maximum(there.bottom - noted.height[owners], noted.bottom[owners] - there.height)
     known = np.zeros(len(noted), dtype=bool)
-    known[owners[(gap < free.resolution) & (there.count >= _ENOUGH)]] = True
+    known[owners[(there.gaps(noted, owners) < free.resolution) & (there.count >= _ENOUGH)]] = True
     new = noted.take(~known)
     free.insert_blocks(new)
     return new

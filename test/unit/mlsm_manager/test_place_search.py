@@ -14,7 +14,7 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import misfit_variances, shares_heard_before
 from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import YAW, State
-from mlsm_manager.joint_solver.place_search import searched_node
+from mlsm_manager.joint_solver.places import searched_node
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import solved_path
 from node_support.geometry import transformed
