@@ -5,13 +5,13 @@ from typing import List, Tuple, Union
 
 import numpy as np
 
+from mlsm_manager.odometry.steps import seconds_untold
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, inverse
 
 _FIRST_CAPACITY = 256
 _GROWTH = 5  # quarters: memory of a long run is dearer than copying
 _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
-_HOLD = 2.0  # s without any move from which on a position is held: longer than a slow DVL waits between two velocities
 
 
 class GrowingArray:
@@ -150,8 +150,10 @@ class OdometryLog:
         if len(self):
             jump = poses[0, 2] - self._table["poses"][-1, 2]
             poses[:, 2] -= 2.0 * np.pi * np.round(jump / (2.0 * np.pi))
-        ahead, held = self._gone_ahead(times, poses[:, 2]), self._seconds_held(times, poses, track.lost[first:last])
-        self._table.extend(times=times, poses=poses, ahead=ahead, held=held)
+        table = self._table
+        untold = seconds_untold(table["times"], table["poses"], times, poses, track.lost[first:last])
+        held = table["held"][-1:].sum() + np.cumsum(untold)
+        table.extend(times=times, poses=poses, ahead=self._gone_ahead(times, poses[:, 2]), held=held)
 
     def _gone_ahead(self, times: np.ndarray, yaw: np.ndarray) -> np.ndarray:
         """Return where the newest (m,) poses are on the path of `Motion.ahead`, by the trapezoidal rule."""
@@ -162,17 +164,6 @@ class OdometryLog:
         heading = np.column_stack([np.cos(yaw), np.sin(yaw)])
         steps = (heading[1:] + heading[:-1]) / 2.0 * np.diff(times)[:, np.newaxis]
         return start + np.cumsum(steps, axis=0)
-
-    def _seconds_held(self, times: np.ndarray, poses: np.ndarray, lost: np.ndarray) -> np.ndarray:
-        """Return for how long (m,) [s] positions were held until each of the newest poses (m, 3); see Motion, Track."""
-        near = slice(max(int(np.searchsorted(self._table["times"], times[0] - _HOLD)) - 1, 0), None)
-        known = self._table["times"][near]
-        all_times, all_poses = np.append(known, times), np.concatenate([self._table["poses"][near], poses])
-        before = np.searchsorted(all_times, times - _HOLD, side="right") - 1
-        moves = poses - all_poses[np.maximum(before, 0)]
-        is_held = (before >= 0) & (moves[:, :2] == 0.0).all(axis=1) & (moves[:, 2] != 0.0)
-        steps = np.diff(all_times, prepend=all_times[0])[len(known) :]
-        return self._table["held"][-1:].sum() + np.cumsum(np.where(is_held, steps, np.minimum(lost, steps)))
 
     def at(self, times: np.ndarray) -> np.ndarray:
         """Return T_odom_base (..., 3) at `times` (...), linearly between the known poses; the nearest beyond them."""

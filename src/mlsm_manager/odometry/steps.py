@@ -19,6 +19,7 @@ _OUTSTANDING = 8.0  # times the usual step around
 _AROUND = 10  # poses before and after that tell what is usual
 _NEXT = 0.3  # s: between two poses of a slow odometry that goes on
 _AT_ZERO = 0.5  # m: where an odometry is that began again
+_HOLD = 2.0  # s without any move from which on a position is held: longer than a slow DVL waits between two velocities
 _SHORTEST_STALL = 1.0  # s of equal positions: longer than between two poses
 _BEFORE = 1.0  # s before a stall that tell how the vehicle went
 _GOES = np.array([0.05, np.radians(2.0)])  # m/s, rad/s: by less it may be stopping
@@ -249,6 +250,24 @@ def _steered(before: np.ndarray, after: np.ndarray, times: np.ndarray, headings:
     steps = durations[:, np.newaxis] * (before + share[:, np.newaxis] * (after - before))
     steps[:, 2] = np.diff(headings)
     return integrated(np.zeros(3), steps)[-1]
+
+
+def seconds_untold(
+    known_times: np.ndarray, known_poses: np.ndarray, times: np.ndarray, poses: np.ndarray, lost: np.ndarray
+) -> np.ndarray:
+    """Return in which part (m,) [s] of the steps to the newest `poses` (m, 3) nothing tells how the vehicle went.
+
+    Positions are lost, as where a stall was bridged, or they do not change at all while the heading does: such a stall
+    was too long to be bridged, or the vehicle is at rest. known: (n,) s and (n, 3), before. lost: (m,) s, see Track.
+    """
+    near = slice(max(int(np.searchsorted(known_times, times[0] - _HOLD)) - 1, 0), None)
+    count = len(known_times[near])
+    all_times, all_poses = np.append(known_times[near], times), np.concatenate([known_poses[near], poses])
+    before = np.searchsorted(all_times, times - _HOLD, side="right") - 1
+    moves = poses - all_poses[np.maximum(before, 0)]
+    is_held = (before >= 0) & (moves[:, :2] == 0.0).all(axis=1) & (moves[:, 2] != 0.0)
+    steps = np.diff(all_times, prepend=all_times[0])[count:]
+    return np.where(is_held, steps, np.minimum(lost, steps))
 
 
 def _trembles(turns: np.ndarray) -> bool:
