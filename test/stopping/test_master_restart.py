@@ -71,7 +71,8 @@ def master(tmp_path):
 def nodes(master, tmp_path):
     """Return the processes of nodes that have begun to publish diagnostics, by name."""
     with LogWriter(tmp_path / "short.852") as log:
-        log.write(LoggedPing(Reply(ReplyKind.IMX, 20, bytes(252))))
+        for stamp in (1e9, 1e9 + 0.2):
+            log.write(LoggedPing(Reply(ReplyKind.IMX, 20, bytes(252)), stamp))
     arguments = {"play_852": [str(tmp_path / "short.852"), "--loop", "__name:=play_852"]}
     started = {node: _started(node, arguments.get(node, []), master) for node in NODES}
     try:

@@ -27,8 +27,9 @@ SENT = {"ODOMETRY", "VISION_POSITION_ESTIMATE", "TIMESYNC"}
 
 
 @pytest.fixture
-def opened():
+def opened(monkeypatch):
     """Return a function that opens a link and its peers; all are closed at the end."""
+    monkeypatch.setattr(link_module, "_QUESTION_PERIOD", 0.05)
     open_ones = []
 
     def make(*peers, **values):
