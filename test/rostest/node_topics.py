@@ -36,10 +36,11 @@ class NodeTopics(unittest.TestCase):
 
     def test_every_node_has_what_the_table_says_and_nothing_else(self) -> None:
         """Without what all nodes have in common; sonar_image takes beams only while somebody looks at its image."""
-        self.viewer = Inbox("/sonar/image", Image)
         wait_until(lambda: all(f"/{node}" in _nodes() for node in NODES))
+        viewer = Inbox("/sonar/image", Image)
         wait_until(lambda: _differences() == {}, required=False)
         self.assertEqual(_differences(), {})
+        viewer.close()
 
 
 def _nodes() -> Set[str]:
