@@ -65,10 +65,12 @@ def assert_named_first(findings, said):
     assert findings.trust.line.startswith("trust: DOUBTFUL")
 
 
+@pytest.mark.long
 def test_distances_that_change_are_named_first(halved):
     assert_named_first(halved.findings, "reported distances are 0.")
 
 
+@pytest.mark.long
 def test_a_path_is_fitted_without_the_fault(halved):
     apart = np.hypot(*(halved.run.best - WHOLE.track.at(halved.run.times))[:, :2].T)
     assert apart.mean() < 1.5  # m; 3 without
@@ -79,6 +81,7 @@ def test_a_current_moves_what_comes_after_it():
     np.testing.assert_allclose(moved[[0, -1]], [[0.0, 0.0], [6.0, 8.0]])
 
 
+@pytest.mark.long
 @pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 @pytest.mark.parametrize(
     ("recording", "said"),
@@ -92,6 +95,8 @@ def test_what_echoes_correct_is_named_first(recording, said):
     assert_named_first(mapped(recording).findings, said)
 
 
+@pytest.mark.long
+@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_nothing_is_named_where_nothing_is_wrong():
     assert mapped(WHOLE).findings.trust.causes == []
 

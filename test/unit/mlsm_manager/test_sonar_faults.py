@@ -50,6 +50,7 @@ def mapped(recording):
     return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", "--refine"]))
 
 
+@pytest.mark.long
 @pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 @pytest.mark.parametrize(
     ("recording", "said", "most"),
