@@ -5,41 +5,21 @@ scripts/bench STUDY measures what takes longer, with options of its own (scripts
 
 import argparse
 import sys
-from functools import partial
 from importlib import import_module
-from typing import Callable, Dict, List
+from typing import List
 
-from benchmarks import chain_figures, map_bag_figures, map_figures, matching_figures, shape_figures, simulation_figures
 from benchmarks.harness import Row, print_table
 
-SECTIONS: Dict[str, Callable[[], List[Row]]] = {
-    "map": map_figures.rows,
-    "large-map": map_figures.large_rows,
-    "carving": map_bag_figures.carving_rows,
-    "map-bag": map_bag_figures.rows,
-    "matching": matching_figures.rows,
-    "chain": chain_figures.rows,
-    "shapes": shape_figures.rows,
-    "simulation": simulation_figures.rows,
-}
+SECTIONS = {
+    "map": "map_figures.rows", "large-map": "map_figures.large_rows", "carving": "map_bag_figures.carving_rows",
+    "map-bag": "map_bag_figures.rows", "matching": "matching_figures.rows", "chain": "chain_figures.rows",
+    "shapes": "shape_figures.rows", "simulation": "simulation_figures.rows",
+}  # fmt: skip
+"""Names of the functions that return their rows: a study need not import what it does not use."""
 STUDIES = (
-    "autopilot",
-    "canals",
-    "chart",
-    "faults",
-    "heads",
-    "honest",
-    "link",
-    "live_faults",
-    "logs",
-    "long_run",
-    "lost",
-    "no_parameters",
-    "page_link",
-    "silence",
-    "web",
-    "workers",
-)
+    "autopilot", "canals", "chart", "faults", "heads", "honest", "link", "live_faults", "logs", "long_run", "lost",
+    "no_parameters", "page_link", "silence", "web", "workers",
+)  # fmt: skip
 
 
 def main() -> None:
@@ -57,8 +37,14 @@ def main() -> None:
         parser.add_argument(f"--{name}", action="append_const", const=name, dest="chosen", help=f"figures of {name}")
     parser.add_argument("--first-seed", type=int, default=0, help="of --matching: other seeds than the published ones")
     arguments = parser.parse_args()
-    sections = {**SECTIONS, "matching": partial(matching_figures.rows, arguments.first_seed)}
-    print_table([row for name in arguments.chosen or list(SECTIONS) for row in sections[name]()])
+    print_table([row for name in arguments.chosen or SECTIONS for row in section_rows(name, arguments.first_seed)])
+
+
+def section_rows(name: str, first_seed: int = 0) -> List[Row]:
+    """Compute the figures of a section; first_seed: of those that are drawn at random."""
+    file, _, function = SECTIONS[name].partition(".")
+    rows = getattr(import_module(f"benchmarks.{file}"), function)
+    return rows(first_seed) if name == "matching" else rows()
 
 
 if __name__ == "__main__":

@@ -4,53 +4,26 @@ The age of a position is the time from the beam, at whose stamp the vehicle has 
 time from the last beam of its scan to the arrival of the first position that has it.
 """
 
-import os
-import subprocess
-import sys
 import time
-from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, Callable, Iterator, List, NamedTuple, Optional, Tuple
+from typing import Any, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table, say
+from benchmarks.harness import Row, benchmark_parser, print_table, say
+from benchmarks.programs import free_port, running, wait_for_graph, wait_until
 
-sys.path.append(str(ROOT / "test/rostest"))
-sys.path.append(str(ROOT / "test/stopping"))
-
-_DEMO = ("rviz:=false", "real_time_factor:=1.0", "odometry_error:=0.3")
-_PATIENCE = 180.0  # s until the graph runs
 _WANTED = "<= 150 ms at 95 %"
 _GAP = 1.0  # s from a position on either side: what lies between is drawn as not sent
 
 
-@contextmanager
-def _graph(master: int, autopilot: int) -> Iterator[None]:
-    """Run the simulated vehicle with its link, under a master of its own."""
-    os.environ["ROS_MASTER_URI"] = f"http://localhost:{master}"
-    package = "underwater_map_construction"
-    commands = [
-        ["roslaunch", "-p", str(master), package, "demo.launch", *_DEMO],
-        ["roslaunch", "--wait", package, "autopilot_link.launch", f"connection:=udpin:127.0.0.1:{autopilot}"],
-    ]
-    running = [subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) for command in commands]
-    try:
-        yield
-    finally:
-        for one in reversed(running):
-            one.terminate()
-            one.wait()
-
-
 def measured(seconds: float, picture: Optional[Path]) -> List[Row]:
     """Return the rows of a run of so many seconds after the first position; picture: where to draw it, a PNG."""
-    from stopwatch import free_port
-
-    master, autopilot = free_port(), free_port()
-    with _graph(master, autopilot):
-        import rosgraph
+    with running() as programs:
+        connection = f"udpin:127.0.0.1:{free_port()}"
+        programs.demo("odometry_error:=0.3")
+        programs.launch("autopilot_link.launch", f"connection:={connection}")
         import rospy
         from autopilot_peer import Peer
         from geometry_msgs.msg import PoseWithCovarianceStamped
@@ -58,15 +31,15 @@ def measured(seconds: float, picture: Optional[Path]) -> List[Row]:
 
         from underwater_map_construction.msg import PositionStatus
 
-        _wait(lambda: rosgraph.is_master_online() and rosgraph.Master("/bench").hasParam("/use_sim_time"))
+        wait_for_graph()
         rospy.init_node("autopilot_bench", anonymous=True, disable_signals=True)
         odometry, truth = Arrivals("/odom", Odometry), Arrivals("/ground_truth", Odometry)
         fixes = Arrivals("/MLSM/pose", PoseWithCovarianceStamped)
         doubts: List[str] = []
         rospy.Subscriber("/MLSM/status", PositionStatus, lambda one: doubts.extend([one.text] if one.state else []))
-        peer = Peer(f"udpin:127.0.0.1:{autopilot}", clock=lambda: rospy.get_rostime().to_nsec())
+        peer = Peer(connection, clock=lambda: rospy.get_rostime().to_nsec())
         say("the vehicle dives; nothing is sent before three fixes agree: about a minute")
-        _wait(lambda: bool(peer.of_type("ODOMETRY")))
+        wait_until(lambda: peer.of_type("ODOMETRY"), "a position")
         say(f"positions come: measuring for {seconds:g} s")
         doubts.clear()
         time.sleep(seconds)
@@ -177,14 +150,6 @@ def _told(seconds: np.ndarray) -> str:
     return " and ".join(f"{round(1e3 * value)} ms" for value in np.percentile(seconds, [50.0, 95.0]))
 
 
-def _wait(holds: Callable[[], bool]) -> None:
-    end = time.monotonic() + _PATIENCE
-    while not holds():
-        if time.monotonic() > end:
-            sys.exit(f"the graph does not run after {_PATIENCE:g} s")
-        time.sleep(0.1)
-
-
 def main() -> None:
     """Print the table."""
     parser = benchmark_parser("autopilot", __doc__)
@@ -192,7 +157,3 @@ def main() -> None:
     parser.add_argument("--picture", type=Path, help="a PNG of what was sent, beside the truth")
     options = parser.parse_args()
     print_table(measured(options.seconds, options.picture))
-
-
-if __name__ == "__main__":
-    main()

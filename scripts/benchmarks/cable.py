@@ -8,19 +8,17 @@ import os
 import shutil
 import signal
 import subprocess
-import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Dict, Iterator, List, Sequence, Tuple
+from typing import Iterator, List, Sequence, Tuple
 
 import numpy as np
 
+from benchmarks.programs import Programs, running, wait_until
+
 VEHICLE, TOPSIDE, _MASK = "10.213.77.1", "10.213.77.2", 30
 _NOBODY = "02:00:00:00:00:01"  # what is sent to this address is lost, and no sender learns of it
-PACKAGE = "underwater_map_construction"
-_DEMO = ("rviz:=false", "real_time_factor:=1.0", "odometry:=dvl")
-_PATIENCE = 240.0  # s until the graph runs
 _EARLY = 1.0  # s
 Version = Tuple[float, str, int]
 """When something came, which one it is, and the checksum of what it shows."""
@@ -93,35 +91,17 @@ def cannot_be_laid(study: str) -> bool:
 
 
 @contextmanager
-def demo_behind(kilobits: int, port: int, folder: str) -> Iterator[Tuple[Cable, "Programs"]]:
-    """Lay a cable, and run demo.launch in real time at its near end; `port`: of the master. Both end with the block."""
-    cable, programs = Cable(kilobits), Programs(port)
+def demo_behind(kilobits: int, folder: str) -> Iterator[Tuple[Cable, Programs]]:
+    """Lay a cable, and run demo.launch in real time at its near end. Both end with the block."""
+    cable = Cable(kilobits)
     try:
         cable.lay()
-        programs.start("roslaunch", "-p", port, PACKAGE, "demo.launch", *_DEMO, f"map_directory:={folder}")
-        yield cable, programs
+        os.environ["ROS_IP"] = VEHICLE
+        with running(VEHICLE) as programs:
+            programs.demo("odometry:=dvl", f"map_directory:={folder}")
+            yield cable, programs
     finally:
-        programs.end()
         cable.remove()
-
-
-class Programs:
-    """What runs at one time, all with one master."""
-
-    def __init__(self, port: int) -> None:
-        os.environ.update(ROS_MASTER_URI=f"http://{VEHICLE}:{port}", ROS_IP=VEHICLE)
-        self._running: List[subprocess.Popen] = []
-
-    def start(self, *command: object, **environment: str) -> None:
-        """Start a program without its output."""
-        quiet: Dict[str, int] = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-        self._running.append(subprocess.Popen([*map(str, command)], env={**os.environ, **environment}, **quiet))
-
-    def end(self) -> None:
-        """End all, the newest first."""
-        for one in reversed(self._running):
-            one.terminate()
-            one.wait()
 
 
 def versions(path: Path) -> List[Version]:
@@ -130,12 +110,8 @@ def versions(path: Path) -> List[Version]:
 
 
 def wait_for(path: Path) -> None:
-    """Wait until a listener has written something; ends the program where it never does."""
-    end = time.monotonic() + _PATIENCE
-    while not path.exists() or not path.read_text():
-        if time.monotonic() > end:
-            sys.exit(f"nothing in {path.name} after {_PATIENCE:g} s")
-        time.sleep(0.5)
+    """Wait until a listener has written something."""
+    wait_until(lambda: path.exists() and path.read_text(), path.name)
 
 
 def arrivals(made: List[Version], came: List[Version], numbers: Sequence[int]) -> np.ndarray:

@@ -101,7 +101,3 @@ def main() -> None:
             solver = solved_live(made, OdometryKind.HEADING)
             found = live_figures(solver, truth.at, lambda times, path=truth: path.at(times)[:, 0] > 0.0)
             print(f"{posts} posts, seed {seed}, from the canal on: {found.line()}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -8,18 +8,16 @@ from typing import List, Tuple
 
 import numpy as np
 
-from benchmarks.harness import Row, benchmark_parser, missing_row, print_table, recorded
+from benchmarks.harness import MARINA, Row, benchmark_parser, mapped_as, marina, missing_row, print_table, recorded
 from georeferencing.adjustment import Adjusted
 from georeferencing.asked import AskedOrigin
 from georeferencing.fixes import Fix
 from georeferencing.origin import Origin
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.charts import origin_of_fixes
-from mlsm_manager.offline.map_bag import map_bag_arguments
-from mlsm_manager.offline.recording import Truth, read_recording
+from mlsm_manager.offline.recording import Truth
 from mlsm_manager.offline.run_files import position_error, positions_at
 
-_RECORDING = "marina_first.bag"
 _PLACE = Origin(42.2, 3.1)  # where the truth's zero is put: the bag does not tell, and errors do not depend on it
 _DEVIATION = 1.0  # m, that the receiver states: a DGPS on a buoy, which the vehicle tows
 _MINUTE = 60.0
@@ -77,9 +75,7 @@ def _errors(mapped: MappedBag, truth: Truth, found: Adjusted) -> Tuple[np.ndarra
 def main() -> None:
     """Print the table."""
     benchmark_parser("chart", __doc__).parse_args()
-    bag = recorded(_RECORDING)
-    if not bag.exists():
-        print_table([missing_row(_RECORDING)])
-        return
-    options = map_bag_arguments([str(bag), "--out", "unused", "--refine", "--truth", "/ground_truth"])
-    print_table(rows(mapped_bag(read_recording(bag, options.request), options)))
+    if recorded(MARINA).exists():
+        print_table(rows(mapped_as(marina(truth="/ground_truth"), "--refine", "--truth", "/ground_truth")))
+    else:
+        print_table([missing_row(MARINA)])

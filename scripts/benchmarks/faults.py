@@ -9,7 +9,6 @@ stated deviations, and "missed" where not.
 """
 
 import re
-from argparse import Namespace
 from collections import Counter
 from dataclasses import replace
 from enum import Enum
@@ -19,18 +18,15 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.fault_rows import faults
-from benchmarks.harness import benchmark_parser, recorded
+from benchmarks.harness import benchmark_parser, compass_alone, mapped_as, marina
 from benchmarks.tours import simulated
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.findings import Trust
-from mlsm_manager.offline.map_bag import map_bag_arguments
-from mlsm_manager.offline.recording import Recording, read_recording, track_between
+from mlsm_manager.offline.recording import Recording, track_between
 from mlsm_manager.offline.run_files import position_error
 from mlsm_manager.scan_matching.scan import Track
 from recordings.bags.bag import RecordingError
-from recordings.reader import Request
 
-_HEADING = np.array([0.0, 0.0, 1.0])
 _COVERS, _MOSTLY = 2.5, 0.95  # stated deviations, which are to hold so large a share of the path
 SOURCES = ("marina", "harbour", "marina compass", "harbour compass")
 _COMPASS = " compass"
@@ -40,10 +36,9 @@ _COMPASS = " compass"
 def source(name: str, seconds: float) -> Recording:
     """Return the beginning of an unbroken recording."""
     if name.endswith(_COMPASS):
-        whole = source(name[: -len(_COMPASS)], seconds)
-        return whole.with_track(Track(whole.track.times, whole.track.poses * _HEADING))
+        return compass_alone(source(name[: -len(_COMPASS)], seconds))
     if name == "marina":
-        return shortened(read_recording(recorded("marina_first.bag"), Request()), seconds)
+        return shortened(marina(), seconds)
     return shortened(simulated("harbour_ahead_tour").with_dvl(1), seconds)
 
 
@@ -78,16 +73,6 @@ class Outcome(NamedTuple):
     cause: str
     line: str
     judged: Judged
-
-
-def mapped(recording: Recording) -> MappedBag:
-    """Return what `map_bag RECORDING --refine` makes of it."""
-    return mapped_bag(recording, map_bag_options())
-
-
-def map_bag_options() -> Namespace:
-    """Return the options of the command."""
-    return map_bag_arguments(["recording", "--out", "nowhere", "--refine"])
 
 
 def distance(one: np.ndarray, times: np.ndarray, whole: MappedBag, poses: np.ndarray) -> np.ndarray:
@@ -135,7 +120,7 @@ def main() -> None:
         recording, whole = source(name, arguments.seconds), None
         for fault, (row, make) in faults(recording.seconds, arguments.seed).items():
             if wanted.search(f"{name}: {fault}"):
-                whole = whole or mapped(recording)
+                whole = whole or mapped_as(recording, "--refine")
                 counts[print_row(f"{name}: {fault}", make(recording), whole, row.named, arguments.truth)] += 1
     print(", ".join(f"{counts[judged]} {judged.value}" for judged in Judged))
 
@@ -143,7 +128,7 @@ def main() -> None:
 def print_row(name: str, recording: Recording, whole: MappedBag, named: str, with_truth: bool) -> Judged:
     """Map a broken recording, print its row, and return what it is."""
     try:
-        found = mapped(recording)
+        found = mapped_as(recording, "--refine")
     except RecordingError as refused:
         print(f"{name:55} refused: {refused}", flush=True)
         return Judged.HELD
@@ -157,7 +142,3 @@ def print_row(name: str, recording: Recording, whole: MappedBag, named: str, wit
         flush=True,
     )
     return row.judged
-
-
-if __name__ == "__main__":
-    main()

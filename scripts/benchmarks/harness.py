@@ -13,11 +13,16 @@ from typing import Any, Callable, Dict, List, Tuple
 
 import numpy as np
 
+from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.recording import Recording, read_recording
+from mlsm_manager.scan_matching.scan import Track
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import Request, read
 from sonar_processing.beams.beam import Beam
 
 ROOT = Path(__file__).resolve().parents[2]
+MARINA = "marina_first.bag"
 Row = Tuple[str, str, str]
 """What was measured, the figure with its unit, and what is wanted of it."""
 
@@ -30,6 +35,22 @@ def recorded(name: str) -> Path:
 def recorded_beams(name: str) -> List[Beam]:
     """Return the beams of a recording of a vehicle at rest. Raises RecordingError."""
     return read(recorded(name), Request(motion=MotionNames(declared=MotionSource.STANDING))).recorded.beams
+
+
+def marina(**asked: str) -> Recording:
+    """Return the marina's first part; `asked`: of Request. Raises RecordingError."""
+    return read_recording(recorded(MARINA), Request(**asked))
+
+
+def compass_alone(recording: Recording) -> Recording:
+    """Return a recording of which the odometry tells nothing but the heading."""
+    track = recording.track
+    return recording.with_track(Track(track.times, track.poses * [0.0, 0.0, 1.0]))
+
+
+def mapped_as(recording: Recording, *options: str) -> MappedBag:
+    """Return what `map_bag RECORDING OPTIONS` makes of a recording."""
+    return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", *options]))
 
 
 def missing_row(name: str) -> Row:

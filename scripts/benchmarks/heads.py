@@ -9,10 +9,9 @@ from typing import Iterable, List, NamedTuple, Optional
 
 import numpy as np
 
-from benchmarks.harness import ROOT, benchmark_parser
+from benchmarks.harness import ROOT, benchmark_parser, mapped_as
 from benchmarks.scans import DEPTH, RAYS
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
-from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.run_files import positions_at
 from mlsm_manager.scan_matching.scan import Track
@@ -163,11 +162,6 @@ class Errors(NamedTuple):
         return cls(far, float(wander), float(told * squares.mean()), float(told * squares[:, 1].mean()), float(within))
 
 
-def mapped_head(head: SimulatedHead) -> MappedBag:
-    """Map a head as map_bag does without options, and refine it."""
-    return mapped_bag(head.recording(), map_bag_arguments(["simulated", "--out", "nowhere", "--refine"]))
-
-
 def print_counts(motions: Iterable[str], seeds: Iterable[int], sector: Optional[int], is_mapped: bool) -> None:
     """Print a row for each motion: how many heads were called what."""
     names = [motion.value for motion in SweepMotion]
@@ -183,7 +177,7 @@ def print_counts(motions: Iterable[str], seeds: Iterable[int], sector: Optional[
 def _print_errors(heads: List[SimulatedHead], called: List[str]) -> None:
     for name in sorted(set(called)):
         chosen = [head for head, one in zip(heads, called) if one == name]
-        found = np.array([Errors.of(mapped_head(head), head.path) for head in chosen])
+        found = np.array([Errors.of(mapped_as(head.recording(), "--refine"), head.path) for head in chosen])
         far, wander = np.median(found[:, :2], axis=0)
         print(
             f"    called {name:9} error {far:.2f} m median, {found[:, 0].max():.2f} m at most; wander {wander:.2f}, "
@@ -210,7 +204,3 @@ def main() -> None:
     arguments = parser.parse_args()
     seeds = range(arguments.first_seed, arguments.first_seed + arguments.count)
     print_counts(arguments.motion or _MOTIONS, seeds, arguments.sector, arguments.map)
-
-
-if __name__ == "__main__":
-    main()

@@ -5,17 +5,16 @@ odometry of simulated tours has the usual errors of a DVL and a compass, drawn w
 """
 
 import re
-from argparse import Namespace
 from functools import partial
 from pathlib import Path
 from typing import Callable, Dict, List, Set
 
-from benchmarks.faults import map_bag_options, shortened
-from benchmarks.harness import benchmark_parser, recorded
+from benchmarks.faults import shortened
+from benchmarks.harness import benchmark_parser, mapped_as, recorded
 from benchmarks.live_faults import told_by
 from benchmarks.tours import simulated
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording, read_recording
 from mlsm_manager.offline.replay import ReplayParameters
 from recordings.bags.bag import RecordingError
@@ -70,20 +69,20 @@ def main() -> None:
     parser.add_argument("--rows", default=".", metavar="REGEX", help="of which recordings; default: all")
     parser.add_argument("--seeds", type=int, nargs="+", default=[12], help="of tours (default: 12)")
     parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
-    arguments, options = parser.parse_args(), map_bag_options()
+    arguments = parser.parse_args()
     runs, offline, live = 0, 0, 0
     for name, made in recordings(arguments.seeds).items():
         if re.search(arguments.rows, name):
-            said = _said(name, made, arguments.seconds, options)
+            said = _said(name, made, arguments.seconds)
             runs, offline, live = runs + 1, offline + bool(said[0]), live + bool(said[1])
     print(f"{runs} recordings: {offline} with a cause offline, {live} live")
 
 
-def _said(name: str, made: Callable[[], Recording], seconds: float, options: Namespace) -> List[Set[str]]:
+def _said(name: str, made: Callable[[], Recording], seconds: float) -> List[Set[str]]:
     """Print and return what is said of the first seconds of a recording, offline and live."""
     try:
         recording = shortened(made(), seconds)
-        mapped = mapped_bag(recording, options)
+        mapped = mapped_as(recording, "--refine")
         said = [offline_causes(mapped), live_causes(recording, mapped.odometry.kind)]
     except RecordingError as refused:
         print(f"{name:50} refused: {refused}", flush=True)
@@ -93,7 +92,3 @@ def _said(name: str, made: Callable[[], Recording], seconds: float, options: Nam
         flush=True,
     )
     return said
-
-
-if __name__ == "__main__":
-    main()

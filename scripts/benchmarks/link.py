@@ -14,23 +14,21 @@ from zlib import crc32
 
 import numpy as np
 
-from benchmarks.cable import PACKAGE, TOPSIDE, Version, arrivals, cannot_be_laid, demo_behind, told, versions, wait_for
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table
+from benchmarks.cable import TOPSIDE, Version, arrivals, cannot_be_laid, demo_behind, told, versions, wait_for
+from benchmarks.harness import Row, benchmark_parser, print_table
+from benchmarks.programs import study
 
 _WANTED = 10.0  # s
 _LISTEN = "--listen"
-LISTENER = [sys.executable, "-m", "benchmarks.link", _LISTEN]
+LISTENER = [*study("link"), _LISTEN]
 """The command that follows tiles, without the topic and the file to which it writes them."""
 
 
 def measured(seconds: float, kilobits: int, rate: float) -> List[Row]:
     """Return the rows of so many seconds after the first scan. rate: of thin_link, bytes a second."""
-    sys.path.append(str(ROOT / "test/stopping"))
-    from stopwatch import free_port
-
-    with tempfile.TemporaryDirectory() as folder, demo_behind(kilobits, free_port(), folder) as (cable, programs):
+    with tempfile.TemporaryDirectory() as folder, demo_behind(kilobits, folder) as (cable, programs):
         made, came = Path(folder, "made"), Path(folder, "came")
-        programs.start("roslaunch", "--wait", PACKAGE, "thin_link.launch", f"bytes_per_second:={rate}")
+        programs.launch("thin_link.launch", f"bytes_per_second:={rate}")
         programs.start(*LISTENER, "MLSM/Markers", made)
         programs.start(*cable.far_end, *LISTENER, "thin/MLSM/Markers", came, ROS_IP=TOPSIDE)
         wait_for(made)
@@ -95,7 +93,3 @@ def main() -> None:
     options = parser.parse_args()
     if not cannot_be_laid("link"):
         print_table(measured(options.seconds, options.kilobits, options.rate))
-
-
-if __name__ == "__main__":
-    main()

@@ -111,7 +111,3 @@ def _arguments() -> Namespace:
     kinds = [kind.value for kind in OdometryKind]
     parser.add_argument("--odometry", default=OdometryKind.AUTO.value, choices=kinds, help="default: %(default)s")
     return parser.parse_args()
-
-
-if __name__ == "__main__":
-    main()

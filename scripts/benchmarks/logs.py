@@ -5,12 +5,12 @@ from typing import List
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from benchmarks.harness import benchmark_parser, mapped_as
+from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.each import recordings_in
-from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
+from recordings.reader import Request
 
 _METRE = 1.0  # m: a surface has about one such cell for each metre of its length
 _DRAWS = 20  # of echoes: their mean differs by less than 0.02 from one seed to another
@@ -70,8 +70,7 @@ def print_rows(folders: List[Path], options: List[str]) -> None:
     print(f"{'recording':32} scans matched blocks blocks/m  sweep  blur  wander odometry             trust")
     for path in recordings_in(folders):
         try:
-            parsed = map_bag_arguments([str(path), "--out", "nowhere", *options])
-            print(row(path.name, mapped_bag(read_recording(path, parsed.request), parsed)), flush=True)
+            print(row(path.name, mapped_as(read_recording(path, Request()), *options)), flush=True)
         except (RecordingError, OSError) as error:
             print(f"{path.name:32} no map: {error}", flush=True)
 
@@ -83,7 +82,3 @@ def main() -> None:
     parser.add_argument("--live", action="store_true", help="without --refine")
     arguments = parser.parse_args()
     print_rows(arguments.folders, [] if arguments.live else ["--refine"])
-
-
-if __name__ == "__main__":
-    main()

@@ -104,7 +104,3 @@ def position_error(number: int, T_map_base: np.ndarray) -> float:
     truth = transformed(inverse(true_path(start))[0], true_path(end)[:, :2])
     found = transformed(inverse(odometry_path(start))[0], T_map_base[np.newaxis, :2])
     return float(np.hypot(*(found - truth)[0]))
-
-
-if __name__ == "__main__":
-    main()

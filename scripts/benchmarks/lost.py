@@ -164,7 +164,3 @@ def main() -> None:
             made[make, of] = make(*of)
         count = min(arguments.starts, _CANAL_STARTS) if make is canal_case else arguments.starts
         print(f"{name}: {line(starts(made[make, of], share, count))}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

@@ -14,23 +14,20 @@ from typing import Callable, Dict, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 from thesis_results.moves import moves_figures
 
-from benchmarks.harness import benchmark_parser, recorded
+from benchmarks.harness import benchmark_parser, compass_alone, mapped_as, marina
 from benchmarks.matching_figures import start_rows
 from benchmarks.paths import PathFigures, judged
 from benchmarks.scans import KINDS, SonarKind
 from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TWINS
 from benchmarks.twins import twin_of
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
-from mlsm_manager.offline.map_bag import map_bag_arguments
-from mlsm_manager.offline.recording import Recording, read_recording
+from mlsm_manager.offline.bag_mapping import MappedBag
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.run_files import aligned_truth, positions_at
 from mlsm_manager.scan_matching.scan import Track
-from recordings.reader import Request
 from sonar_processing.beams.parameters import BeamCorrection
 
 TOURS = ("harbour", "harbour_ahead", "basin", "basin_ahead")
-_MARINA, _TRUTH = "marina_first.bag", "/ground_truth"
 _SOUND = 0.02  # relative deviation of ranges by the speed of sound: the prior's
 _DRAWN = {
     "30 % off, all errors drawn": {"scale": 0.3},
@@ -42,7 +39,6 @@ _DRAWN = {
 """What is wrong with an odometry of DVL and compass besides its usual errors; of these rows NEES should be 1."""
 _GOES_AND_STANDS = (15.0, 5.0)  # s, mean durations
 _MOVES, _STARTS = "thesis's three moves, 30 % off", 30
-_HEADING = np.array([0.0, 0.0, 1.0])
 _COLUMNS = ("live", "refined", "shape", "NEES", "refined", "stated", "refined", "ms", "odometry found")
 
 
@@ -70,7 +66,7 @@ def rows() -> Dict[str, Row]:
         **{
             f"marina_first, positions x {s:g}": Row(partial(_marina, np.array([s, s, 1.0])), 1) for s in (0.7, 0.9, 1.3)
         },
-        "marina_first, compass alone": Row(partial(_marina, _HEADING), 1),
+        "marina_first, compass alone": Row(partial(_marina, np.array([0.0, 0.0, 1.0])), 1),
         **dict(_scaled_rows()),
         **{f"{tour}, {what}": Row(partial(_drawn, tour, _DRAWN[what])) for what in _DRAWN for tour in TOURS},
         **{f"{tour}, odometry stalls for 5 s": Row(partial(_stalled, tour)) for tour in TOURS},
@@ -91,7 +87,7 @@ def _scaled_rows() -> Iterator[Tuple[str, Row]]:
 
 def _marina(factors: np.ndarray, _seed: int) -> Recording:
     """Return the recording with an odometry that reports so many times (3,) its poses."""
-    recording = read_recording(recorded(_MARINA), Request(truth=_TRUTH))
+    recording = marina(truth="/ground_truth")
     return recording.with_track(Track(recording.track.times, recording.track.poses * factors))
 
 
@@ -121,18 +117,16 @@ def _head(world: str, kind: SonarKind, seed: int) -> Recording:
 
 
 def _compass(tour: str, seed: int) -> Recording:
-    recording = simulated(f"{tour}_tour").with_dvl(seed, direction=0.0)
-    return recording.with_track(Track(recording.track.times, recording.track.poses * _HEADING))
+    return compass_alone(simulated(f"{tour}_tour").with_dvl(seed, direction=0.0))
 
 
 def _twin(name: str, _seed: int) -> Recording:
-    return twin_of(read_recording(recorded(_MARINA), Request()), TWINS[name])
+    return twin_of(marina(), TWINS[name])
 
 
 def outcome(recording: Recording, named: Sequence[str]) -> Outcome:
     """Map a recording whose truth is known."""
-    options = map_bag_arguments(["recording", "--out", "nowhere", "--refine", *named])
-    mapped = mapped_bag(recording, options)
+    mapped = mapped_as(recording, "--refine", *named)
     found = mapped.replayed.hypotheses.told or mapped.odometry.kind.value
     milliseconds = 1e3 * float(np.median(mapped.replayed.seconds))
     return Outcome(_live(mapped, recording), _refined(mapped, recording), found, milliseconds)
@@ -200,7 +194,3 @@ def main() -> None:
     if wanted.search("starts in a known map"):
         for title, found, _ in start_rows(KINDS[0], count=_STARTS):
             print_line(title, [found])
-
-
-if __name__ == "__main__":
-    main()

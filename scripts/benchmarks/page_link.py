@@ -13,26 +13,16 @@ import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import List, Sequence, Tuple
+from typing import List, Tuple
 from zlib import adler32
 
 import numpy as np
 from tornado.websocket import websocket_connect
 
 from benchmarks import link
-from benchmarks.cable import (
-    PACKAGE,
-    TOPSIDE,
-    VEHICLE,
-    Version,
-    arrivals,
-    cannot_be_laid,
-    demo_behind,
-    told,
-    versions,
-    wait_for,
-)
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table, say
+from benchmarks.cable import TOPSIDE, VEHICLE, Version, arrivals, cannot_be_laid, demo_behind, told, versions, wait_for
+from benchmarks.harness import Row, benchmark_parser, print_table, say
+from benchmarks.programs import free_port, study
 from benchmarks.web import HELLO, chromium, first_picture
 
 _GROWN = 60.0  # s of mapping before the page is opened
@@ -59,21 +49,18 @@ Cut = Tuple[str, float, float]
 
 def measured(seconds: float, kilobits: int, thin_link: bool) -> List[Row]:
     """Return the rows of so many seconds of mapping, and of the cuts after them."""
-    sys.path.append(str(ROOT / "test/stopping"))
-    from stopwatch import free_port
-
-    with tempfile.TemporaryDirectory() as folder, demo_behind(kilobits, free_port(), folder) as (cable, programs):
+    with tempfile.TemporaryDirectory() as folder, demo_behind(kilobits, folder) as (cable, programs):
         made, came, first, seen = (Path(folder, name) for name in ("made", "came", "first", "seen"))
         port = free_port()
-        programs.start("roslaunch", "--wait", PACKAGE, "web_page.launch", "host:=0.0.0.0", f"port:={port}")
-        programs.start(*_program(_NEAR), port, made)
+        programs.launch("web_page.launch", "host:=0.0.0.0", f"port:={port}")
+        programs.start(*study("page_link"), _NEAR, port, made)
         wait_for(made)
         if thin_link:
-            programs.start("roslaunch", "--wait", PACKAGE, "thin_link.launch")
+            programs.launch("thin_link.launch")
             programs.start(*cable.far_end, *link.LISTENER, "thin/MLSM/Markers", seen, ROS_IP=TOPSIDE)
         say(f"the vehicle maps for {_GROWN:g} s before the page is opened")
         time.sleep(_GROWN)
-        programs.start(*cable.far_end, *_program(_FAR), port, came, first)
+        programs.start(*cable.far_end, *study("page_link"), _FAR, port, came, first)
         wait_for(came)
         say(f"the page is open: measuring for {seconds:g} s")
         before, begin = cable.sent_bytes, time.time()
@@ -90,10 +77,6 @@ def measured(seconds: float, kilobits: int, thin_link: bool) -> List[Row]:
             *_of_changes(*found, begin, begin + seconds),
             *(_of_cut(*found, cut) for cut in cuts),
         ]
-
-
-def _program(which: str) -> Sequence[str]:
-    return [sys.executable, "-m", "benchmarks.page_link", which]
 
 
 def _of_changes(made: List[Version], came: List[Version], begin: float, end: float) -> List[Row]:
@@ -161,7 +144,3 @@ def main() -> None:
     options = parser.parse_args()
     if not cannot_be_laid("page_link"):
         print_table(measured(options.seconds, options.kilobits, options.thin_link))
-
-
-if __name__ == "__main__":
-    main()

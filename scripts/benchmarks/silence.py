@@ -11,15 +11,15 @@ from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser, recorded
+from benchmarks import harness
+from benchmarks.harness import benchmark_parser, compass_alone
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.offline.recording import Recording, read_recording
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import Replayed, replay
 from mlsm_manager.scan_matching.scan import Track
-from recordings.reader import Request
 
 TOURS = ("harbour_ahead_tour", "basin_ahead_tour")
 SHARES = (0.4, 0.55, 0.7)  # of the run's length, where the silence begins
@@ -119,10 +119,10 @@ def tours(names: List[str], kind: OdometryKind, seeds: int) -> Iterator[Tuple[st
 
 def marina(kind: OdometryKind) -> Tuple[str, Recording, Track]:
     """Return the marina's first part, and the vehicle's path in it by its DVL."""
-    recording = read_recording(recorded("marina_first.bag"), Request())
+    recording = harness.marina()
     whole = replayed(recording, OdometryKind.DVL)
     if kind is OdometryKind.HEADING:
-        recording = recording.with_track(Track(recording.track.times, recording.track.poses * [0.0, 0.0, 1.0]))
+        recording = compass_alone(recording)
     return "marina", recording, Track(whole.times, whole.corrected)
 
 
@@ -145,7 +145,3 @@ def main() -> None:
                     found = figures(replayed(missing, kind), truth, start, options.seconds)
                     case = f"{name}, {kind.value.lower()}, {silence.value} from {share * recording.seconds:.0f} s on"
                     print(f"{case}: {found.line()}", flush=True)
-
-
-if __name__ == "__main__":
-    main()

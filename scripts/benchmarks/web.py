@@ -9,21 +9,20 @@ pages have the others.
 import asyncio
 import json
 import os
-import subprocess
-import sys
 import time
-from contextlib import contextmanager, suppress
+from contextlib import contextmanager
 from typing import Any, Dict, Iterator, List, Tuple
+from urllib.request import urlopen
 
 import numpy as np
 from tornado.websocket import websocket_connect
 
-from benchmarks.harness import ROOT, Row, benchmark_parser, print_table, say
+from benchmarks.harness import Row, benchmark_parser, print_table, say
+from benchmarks.programs import Programs, free_port, running, wait_for_graph, wait_until
 
 _PAGES = 10
 HELLO = json.dumps({"hello": {"run": "", "revision": 0}})
 """With which a page begins that has nothing yet."""
-_PATIENCE = 180.0  # s until the graph runs
 _WARM_UP = 40.0  # s: some scans are matched
 _REVOLUTION = 20.0  # s until all beams of one have come
 _TURNS = ("without the node", "no page", f"{_PAGES} pages")
@@ -39,24 +38,19 @@ Turn = Dict[str, float]
 
 def measured(seconds: float, rounds: int) -> List[Row]:
     """Return the rows of so many rounds of three turns of so many seconds each."""
-    sys.path.append(str(ROOT / "test/stopping"))
-    from stopwatch import free_port
-
-    port = free_port()
-    os.environ["ROS_MASTER_URI"] = f"http://localhost:{(master := free_port())}"
-    demo = _launched("-p", str(master), "demo.launch", "rviz:=false", "real_time_factor:=1.0")
-    # Pages are on other computers.
-    os.sched_setaffinity(0, set(range(1, os.cpu_count() or 1)) or {0})
-    try:
+    port, turns, rates, first = free_port(), [], [], np.nan
+    with running(before="taskset -c 0") as programs:
+        programs.demo()
+        # Pages are on other computers.
+        os.sched_setaffinity(0, set(range(1, os.cpu_count() or 1)) or {0})
         figures = Figures()
         figures.wait()
         say(f"the vehicle maps for {_WARM_UP:g} s first")
         time.sleep(_WARM_UP)
-        turns, rates, first = [], [], np.nan
         for number in range(rounds):
             say(f"round {number + 1} of {rounds}: {seconds:g} s each of {', '.join(_TURNS)}")
             turns.append([figures.over(seconds)])
-            with _page_node(port):
+            with _page_node(programs, port):
                 if number == 0:
                     time.sleep(_REVOLUTION)
                     with chromium() as browser:
@@ -65,9 +59,6 @@ def measured(seconds: float, rounds: int) -> List[Row]:
                 told, watched = asyncio.run(_watched(port, seconds, figures))
                 turns[-1].append(watched)
                 rates += told
-    finally:
-        demo.terminate()
-        demo.wait()
     return [
         ("first picture", f"{first:.1f} s", "<= 2 s"),
         ("sent to a page, median, not compressed", f"{np.median(rates) / 1e3:.1f} kB/s", "<= 60 kB/s"),
@@ -78,22 +69,23 @@ def measured(seconds: float, rounds: int) -> List[Row]:
     ]
 
 
-def _launched(*arguments: str) -> "subprocess.Popen[bytes]":
-    package, quiet = "underwater_map_construction", {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    options = [one for one in arguments if one.startswith("-") or one.isdigit()]
-    return subprocess.Popen(["taskset", "-c", "0", "roslaunch", *options, package, *arguments[len(options) :]], **quiet)
-
-
 @contextmanager
-def _page_node(port: int) -> Iterator[None]:
+def _page_node(programs: Programs, port: int) -> Iterator[None]:
     """Run web_page, from when it serves the page to the end of the block."""
-    node = _launched("--wait", "web_page.launch", f"port:={port}")
+    node = programs.launch("web_page.launch", f"port:={port}")
     try:
-        _wait_for_port(port)
+        wait_until(lambda: _is_served(port), "the page")
         yield
     finally:
-        node.terminate()
-        node.wait()
+        programs.end(node)
+
+
+def _is_served(port: int) -> bool:
+    try:
+        urlopen(f"http://127.0.0.1:{port}/", timeout=5.0).close()
+        return True
+    except OSError:
+        return False
 
 
 def _compared(name: str, key: str, unit: str, rounds: List[List[Turn]], wanted: str) -> Row:
@@ -127,18 +119,6 @@ def first_picture(browser: Any, address: str) -> float:
     return time.monotonic() - start
 
 
-def _wait_for_port(port: int) -> None:
-    from urllib.request import urlopen
-
-    end = time.monotonic() + _PATIENCE
-    while time.monotonic() < end:
-        with suppress(OSError):
-            urlopen(f"http://127.0.0.1:{port}/", timeout=5.0).close()
-            return
-        time.sleep(0.2)
-    sys.exit(f"the page is not served after {_PATIENCE:g} s")
-
-
 async def _watched(port: int, seconds: float, figures: "Figures") -> Tuple[List[float], Turn]:
     """Return what each of the pages got in a second, and the figures meanwhile."""
     loop = asyncio.get_event_loop()
@@ -165,15 +145,10 @@ class Figures:
 
     def wait(self) -> None:
         """Wait until the graph runs, and listen."""
-        import rosgraph
         import rospy
         from diagnostic_msgs.msg import DiagnosticArray
 
-        end = time.monotonic() + _PATIENCE
-        while not (rosgraph.is_master_online() and rosgraph.Master("/bench").hasParam("/use_sim_time")):
-            if time.monotonic() > end:
-                sys.exit(f"the graph does not run after {_PATIENCE:g} s")
-            time.sleep(0.1)
+        wait_for_graph()
         rospy.init_node("web_bench", anonymous=True, disable_signals=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._take, queue_size=100)
 
@@ -229,7 +204,3 @@ def main() -> None:
     parser.add_argument("--rounds", type=int, default=2, help="of the three turns")
     options = parser.parse_args()
     print_table(measured(options.seconds, options.rounds))
-
-
-if __name__ == "__main__":
-    main()

@@ -101,7 +101,3 @@ def main() -> None:
     os.sched_setaffinity(0, range(os.cpu_count() or 1))
     with tempfile.TemporaryDirectory() as scratch:
         print_rows(recordings_in(parser.parse_args().recordings), Path(scratch))
-
-
-if __name__ == "__main__":
-    main()

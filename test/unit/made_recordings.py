@@ -11,7 +11,7 @@ from sonar_processing.beams.beam import Beam, PlacedBeam
 
 SECONDS = 300.0
 _START = 1000.0
-_CORNERS = np.array(
+HARBOUR = np.array(
     [[-25.0, -18.0], [20.0, -18.0], [20.0, -6.0], [30.0, -6.0], [30.0, 20.0], [4.0, 20.0], [4.0, 14.0], [-25.0, 14.0]]
 )  # m
 _BINS, _RESOLUTION = 200, 0.3
@@ -36,7 +36,7 @@ def _along(way: Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]]) -> Record
     track = Track(times, np.column_stack([x, y, yaw]))
     stamps = np.arange(_START + 1.0, _START + SECONDS - 1.0, _BEAM)
     poses, heads = track.at(stamps), _STEP * np.arange(len(stamps))
-    ranges = _ranges(poses[:, :2], poses[:, 2] + heads)
+    ranges = ranges_along(poses[:, :2], poses[:, 2] + heads)
     places = matrices(poses)
     beams = [
         PlacedBeam(Beam(round(1e9 * stamp), "sonar", head, _strengths(distance), _RESOLUTION), place, True)
@@ -45,15 +45,15 @@ def _along(way: Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]]) -> Record
     return Recording(beams, 0, track, None)
 
 
-def _ranges(origins: np.ndarray, bearings: np.ndarray) -> np.ndarray:
-    """Return the distances (n,) [m] of the walls from (n, 2) along bearings (n,) [rad]."""
-    ahead = np.column_stack([np.cos(bearings), np.sin(bearings)])[:, np.newaxis]
-    first, wall = _CORNERS - origins[:, np.newaxis], np.roll(_CORNERS, -1, axis=0) - _CORNERS
-    crossed = ahead[..., 0] * wall[:, 1] - ahead[..., 1] * wall[:, 0]
-    crossed = np.where(np.abs(crossed) < 1e-9, 1e-9, crossed)
-    along = (first[..., 0] * wall[:, 1] - first[..., 1] * wall[:, 0]) / crossed
-    share = (first[..., 0] * ahead[..., 1] - first[..., 1] * ahead[..., 0]) / crossed
-    return np.where((along > 0.0) & (share >= 0.0) & (share <= 1.0), along, np.inf).min(axis=1)
+def ranges_along(places: np.ndarray, angles: np.ndarray, corners: np.ndarray = HARBOUR) -> np.ndarray:
+    """Return how far (n,) [m] the walls between `corners` (k, 2) are from `places` (n, 2) along `angles` (n,) [rad]."""
+    rays = np.column_stack([np.cos(angles), np.sin(angles)])[:, np.newaxis]
+    along = np.roll(corners, -1, axis=0) - corners
+    to_corner = corners - places[:, np.newaxis]
+    cross = rays[..., 0] * along[:, 1] - rays[..., 1] * along[:, 0]
+    ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
+    share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross
+    return np.where((ranges > 0.0) & (share >= 0.0) & (share <= 1.0), ranges, np.inf).min(axis=1)
 
 
 def _strengths(distance: float) -> np.ndarray:

@@ -31,7 +31,8 @@ def install(copy: Path) -> None:
         _pip("setuptools>=61", "wheel")
         _pip(str(copy))
         stamp.write_bytes(wanted)
-    _pip("--no-deps", "--no-build-isolation", "--no-index", "--force-reinstall", str(copy))
+    else:
+        _pip("--no-deps", "--no-build-isolation", "--no-index", "--force-reinstall", str(copy))
 
 
 def run(*command: object, folder: Path) -> str:

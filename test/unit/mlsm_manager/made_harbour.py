@@ -4,6 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Callable, List, Optional, Sequence
 
 import numpy as np
+from made_recordings import HARBOUR, ranges_along
 
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -12,11 +13,6 @@ from node_support.geometry import composed, inverse, rotated, transformed
 TURN = 14.0  # s per turn of the head
 BEAMS = 120
 SONAR_IN_BASE = np.array([0.3, 0.0])
-HARBOUR = np.array(
-    [[-25.0, -18.0], [20.0, -18.0], [20.0, -6.0], [30.0, -6.0], [30.0, 20.0], [4.0, 20.0], [4.0, 14.0], [-25.0, 14.0]]
-)
-
-
 # 300 m long and 20 m wide.
 CANAL = np.array([[-25.0, -10.0], [275.0, -10.0], [275.0, 10.0], [-25.0, 10.0]])
 
@@ -116,17 +112,7 @@ def _scan(
     bearings = 2.0 * np.pi * np.arange(BEAMS) / BEAMS
     poses = truth.at(stamps + delay)
     sonar = poses[:, :2] + rotated(np.tile(SONAR_IN_BASE, (BEAMS, 1)), poses[:, 2])
-    ranges = _ranges(sonar, bearings + poses[:, 2], corners) + rng.normal(0.0, noise, BEAMS)
+    ranges = ranges_along(sonar, bearings + poses[:, 2], corners) + rng.normal(0.0, noise, BEAMS)
     seen = SONAR_IN_BASE + ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
     points = np.column_stack([transformed(odometry.at(stamps), seen), np.zeros(BEAMS), np.full(BEAMS, 100.0)])
     return Scan(points, stamps, np.ones(BEAMS, dtype=bool), odometry, float(stamps[-1]))
-
-
-def _ranges(places: np.ndarray, angles: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    rays = np.column_stack([np.cos(angles), np.sin(angles)])[:, np.newaxis]
-    along = np.roll(corners, -1, axis=0) - corners
-    to_corner = corners - places[:, np.newaxis]
-    cross = rays[..., 0] * along[:, 1] - rays[..., 1] * along[:, 0]
-    ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
-    share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross
-    return np.where((ranges > 0.0) & (share >= 0.0) & (share <= 1.0), ranges, np.inf).min(axis=1)

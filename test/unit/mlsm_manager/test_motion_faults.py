@@ -4,11 +4,10 @@ import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
+from benchmarks.harness import mapped_as
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
-from mlsm_manager.offline.bag_mapping import mapped_bag
-from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
 
@@ -50,14 +49,10 @@ def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
     assert fault.text == said
 
 
-def mapped(recording):
-    return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", "--refine"]))
-
-
 @pytest.fixture(scope="module")
 def halved():
     """Return what is found of an odometry that reports half of each distance from the middle on."""
-    return mapped(broken.odometry_scaled(WHOLE, 0.5, at=MIDDLE))
+    return mapped_as(broken.odometry_scaled(WHOLE, 0.5, at=MIDDLE), "--refine")
 
 
 def assert_named_first(findings, said):
@@ -92,13 +87,13 @@ def test_a_current_moves_what_comes_after_it():
     ],
 )
 def test_what_echoes_correct_is_named_first(recording, said):
-    assert_named_first(mapped(recording).findings, said)
+    assert_named_first(mapped_as(recording, "--refine").findings, said)
 
 
 @pytest.mark.long
 @pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_nothing_is_named_where_nothing_is_wrong():
-    assert mapped(WHOLE).findings.trust.causes == []
+    assert mapped_as(WHOLE, "--refine").findings.trust.causes == []
 
 
 @pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1), (90.0, 1), (-179.0, 1)])

@@ -3,12 +3,11 @@
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
+from benchmarks.harness import mapped_as
 from benchmarks.rare_faults import mount_tilted
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
-from mlsm_manager.offline.bag_mapping import mapped_bag
-from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 WHOLE, MIDDLE = touring(), SECONDS / 2.0
@@ -46,10 +45,6 @@ def test_points_lie_where_they_would_without_the_fault(fault, places):
     np.testing.assert_allclose(moved.points[:, :2], places, atol=1e-9)
 
 
-def mapped(recording):
-    return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", "--refine"]))
-
-
 @pytest.mark.long
 @pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 @pytest.mark.parametrize(
@@ -62,7 +57,7 @@ def mapped(recording):
     ids=["arm", "tilt", "ranges"],
 )
 def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, most):
-    found = mapped(recording)
+    found = mapped_as(recording, "--refine")
     assert found.findings.trust.causes[0].text.startswith(said)
     assert found.findings.trust.line.startswith("trust: DOUBTFUL")
     apart = np.hypot(*(found.run.best - WHOLE.track.at(found.run.times))[:, :2].T)
