@@ -176,7 +176,7 @@ class OdometryLog:
 
     def track_from(self, start: float) -> Track:
         """Return the known poses from `start` [s] on, and the one before; for how long positions were held is lost."""
-        known = self.between(start, np.inf)
+        _, known = self.path(np.array([start]), start, np.inf)
         return Track(known.times, known.poses, np.diff(known.held, prepend=known.held[0]))
 
     def velocity_at(self, time: float) -> np.ndarray:
