@@ -1,5 +1,6 @@
 """What is wrong with a recording is found and named, and what a vehicle cannot have done is mended."""
 
+from dataclasses import replace
 from time import monotonic
 
 import numpy as np
@@ -250,6 +251,25 @@ def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(
     assert (np.trace(live.covariance([])) > 0.25) == bool(said)
     live.clear()
     assert live.causes([]) == []
+
+
+def later(scan, seconds):
+    """Return a scan as it would have come so many seconds later."""
+    track = Track(scan.track.times + seconds, scan.track.poses)
+    return replace(scan, times=scan.times + seconds, reference_time=scan.reference_time + seconds, track=track)
+
+
+def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
+    live, scans = LiveCauses(), scans_in(broken.head_slips(WHOLE, 60.0, 30.0))
+    for scan in scans[:10]:
+        live.take(scan, scan.reference_pose)
+    live.look()
+    for scan in scans_in(WHOLE):
+        live.take(later(scan, SECONDS), scan.reference_pose)
+    live.look()
+    (slipped,) = live.causes([])
+    assert slipped.text.startswith("the head slipped by")
+    assert slipped.begin == pytest.approx(START + 60.0, abs=10.0)
 
 
 def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows():
