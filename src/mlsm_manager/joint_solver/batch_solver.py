@@ -127,9 +127,12 @@ def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
 
 
-def likelihood_of(run: Solution) -> float:
-    """Return the log likelihood of a whole run at its state, as that of a fit."""
-    return _Batch(run).log_likelihood()
+def likelihood_of(run: Solution, across: float = np.nan) -> float:
+    """Return the log likelihood of a whole run at its state, as that of a fit.
+
+    across: s, where only what scans before and after it tell of each other is to count; NaN for all.
+    """
+    return _Batch(run).log_likelihood(across)
 
 
 def fit_path(live: LiveSolver, start: State) -> State:
@@ -203,9 +206,12 @@ class _Batch:
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
-    def log_likelihood(self) -> float:
+    def log_likelihood(self, across: float = np.nan) -> float:
         """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""
         points, pairs = self._met()
+        if not np.isnan(across):
+            later = self._run.log.node_times[points.scans] >= across
+            pairs = pairs._replace(importance=pairs.importance * (later[pairs.rows] != later[pairs.neighbours]))
         on_surfaces = support(pairs, points, points, self._parameters)
         return on_surfaces - 0.5 * self._expected().cost
 

@@ -7,11 +7,12 @@ from typing import List, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of, likelihood_of
-from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_trials import reckoned
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.surface_points import SurfacePoints
+from mlsm_manager.joint_solver.velocity_models import AHEAD, TRAVEL
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry import inverse, transformed
 
@@ -30,6 +31,10 @@ _STEPS = {SonarKind.ARM: 1.0, SonarKind.TILT: 0.02}
 """By which kinds that hold all along are tried: far enough that echoes tell it, and less than what is named."""
 _SHARE = 0.1  # of a step, in which the likelihood changes evenly
 _FARTHEST = 2.0  # steps: beyond, likelihoods are no parabolas
+_LARGEST = np.log(5.0)  # of settings: more is none
+_CHANGES = 4  # of ranges, that are tried
+_PASSES = 2  # nodes that a change of ranges makes lie wrongly
+_FEWEST = 10  # points of a scan that tell how far it hears
 _STEEP = 4.0  # nats a step: with less no fault of the kind makes even a marina, which tells least, three nats likelier
 
 
@@ -70,6 +75,11 @@ class SonarFault:
         if self.kind is SonarKind.TILT:
             return self._tilt > _TILT
         return float(np.linalg.norm(self.sizes)) > (_ARM if self.kind is SonarKind.ARM else _FACTOR)
+
+    @property
+    def is_possible(self) -> bool:
+        """Whether a sonar can have it."""
+        return self.kind is not SonarKind.RANGES or abs(self.sizes[0]) < _LARGEST
 
     def _stretch(self) -> np.ndarray:
         """(2, 2), from places as reported, from the sonar and along base_link's axes, to the true ones."""
@@ -115,13 +125,58 @@ class SonarFault:
 def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, BatchResult]:
     """Return a run without a fault of its sonar, and its fit.
 
-    After a change of ranges it begins where the odometry leads: the path that they made may be far from the true one.
+    After a change of ranges it begins where the odometry leads, or, where that tells no distances, with a path that is
+    as much longer: the path that they made may be far from the true one.
     """
     log, nodes = fault.logged(run.log), run.state.nodes
     if fault.kind is SonarKind.RANGES:
-        nodes = reckoned(run, log, nodes, (fault.begin, np.inf))
+        alone = np.isinf(run.odometry.distance_deviation)
+        nodes = _longer(run, log, nodes, fault) if alone else reckoned(run, log, nodes, (fault.begin, np.inf))
     changed = replace(run, log=log, state=State(nodes.copy(), run.state.run.copy()))
     return changed, fit_of(changed)
+
+
+def _longer(run: Solution, log: RunLog, nodes: np.ndarray, fault: SonarFault) -> np.ndarray:
+    """Return the nodes with all ways and speeds after a change of ranges as much longer as the true ranges are.
+
+    About the change itself, where no scan lay on those before it, the vehicle goes on as before.
+    """
+    result, factor = nodes.copy(), np.exp(fault.sizes[0])
+    first = max(int(np.searchsorted(log.node_times, fault.begin)) - 1, 0)
+    places = log.node_poses(np.arange(len(nodes)))[:, :YAW] + nodes[:, :YAW]
+    result[first:, :YAW] += (factor - 1.0) * (places[first:] - places[first])
+    result[first:, AHEAD : TRAVEL + 1] *= factor
+    result[first : first + _PASSES, AHEAD : TRAVEL + 1] = nodes[max(first - 1, 0), AHEAD : TRAVEL + 1]
+    last = log.node_times[min(first + _PASSES, len(nodes) - 1)]
+    return reckoned(run, log, result, (fault.begin, last))
+
+
+def likelihood_across(run: Solution, fit: BatchResult, fault: SonarFault) -> float:
+    """Return how likely a run, fitted as `fit` says, is by what scans before and after a change tell of each other.
+
+    Scans lie closer to each other the smaller the sonar is said to hear the world, whatever is true: so only those
+    count, and they are to lie closer by as much.
+    """
+    closer = min(float(np.exp(fault.sizes[0])), 1.0)
+    parameters = replace(
+        run.parameters, echo_deviation=closer * run.parameters.echo_deviation, cut=closer * run.parameters.cut
+    )
+    return likelihood_of(replace(run, parameters=parameters, state=fit.state), fault.begin)
+
+
+def changed_ranges(run: Solution) -> List[SonarFault]:
+    """Return the likeliest changes of the range setting: where all around much more is heard, or less, of the range."""
+    log, heard, found = run.log, [], []
+    for scan in range(log.scan_count):
+        points, _ = log.surfaces.points(log.rows(scan, scan + 1))
+        heard.append((points.bearings + log.odometry.at(points.times)[:, YAW], np.log(points.ranges)))
+    for scan, begin in enumerate((log.node_times[1:-2] + log.node_times[2:-1]) / 2.0, start=1):
+        (bearings, before), (later, after) = heard[scan - 1], heard[scan + 1]
+        if min(len(before), len(after)) >= _FEWEST:
+            nearer = float(np.median(np.interp(later, bearings, before, period=2.0 * np.pi) - after))
+            found.append(SonarFault(SonarKind.RANGES, float(begin), (nearer,)))
+    possible = [fault for fault in found if fault.is_beyond(np.inf) and fault.is_possible]
+    return sorted(possible, key=lambda fault: -abs(fault.sizes[0]))[:_CHANGES]
 
 
 def likeliest(run: Solution, fit: BatchResult) -> List[SonarFault]:

@@ -27,7 +27,7 @@ class FaultKind(Enum):
     CARRIED = "a current carried the vehicle, and the odometry did not feel it"
 
 
-_OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
+OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
 _OF_PAIRS = (FaultKind.SLIP, FaultKind.CARRIED)  # that pairs of scans show
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 
@@ -53,7 +53,7 @@ class MotionFault:
     def text(self) -> str:
         """What is wrong and by how much."""
         size = float(np.linalg.norm(self.sizes))
-        if self.kind in _OF_DISTANCES:
+        if self.kind in OF_DISTANCES:
             return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
         if self.kind is FaultKind.DRIFT:
             return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
@@ -69,7 +69,7 @@ class MotionFault:
         if self.kind is FaultKind.CARRIED:
             return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind is FaultKind.DRIFT else 1.0)
-        return size > (_USUAL_LENGTH if self.kind in _OF_DISTANCES else _USUAL_HEADING)
+        return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
 
     def mended(self, track: Track) -> Track:
         """Return T_odom_base without the fault; positions are reckoned anew, as the vehicle did from its heading.
@@ -81,7 +81,7 @@ class MotionFault:
             return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
         steps = composed(inverse(track.poses[:-1]), track.poses[1:])
         errors = _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
-        if self.kind in _OF_DISTANCES:
+        if self.kind in OF_DISTANCES:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])
             return track.with_poses(integrated(track.poses[0], steps))
         yaws = track.poses[:, 2] + errors
@@ -124,7 +124,7 @@ def likely_faults(times: np.ndarray, yaws: np.ndarray, headings: np.ndarray, sca
     for kind in FaultKind:
         if kind in _OF_PAIRS:
             continue
-        values = logs if kind in _OF_DISTANCES else headings
+        values = logs if kind in OF_DISTANCES else headings
         tried = [_explained(kind, times, yaws, values, float(begin)) for begin in _begins(times, kind)]
         found.append(min(tried, key=lambda one: one[0])[1])
     return found

@@ -5,14 +5,14 @@ from argparse import Namespace
 from dataclasses import dataclass, replace
 from functools import partial
 from itertools import cycle
-from typing import List, Optional, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 from tqdm import tqdm
 
 from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
+from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind, strafes
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings, Trust
@@ -21,13 +21,21 @@ from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, 
 from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
-from mlsm_manager.offline.suited_parameters import OdometryFound, may_strafe, odometry_of, with_cells, with_odometry
+from mlsm_manager.offline.suited_parameters import (
+    OdometryFound,
+    goes_on_better,
+    may_strafe,
+    odometry_of,
+    with_cells,
+    with_odometry,
+)
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck, ranked
 from mlsm_manager.self_check.companions import without_companions
-from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings
-from mlsm_manager.self_check.hypotheses import AS_TOLD
+from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, turn_text
+from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
+from mlsm_manager.self_check.motion_findings import goes_on_with_other_ranges
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.surface_map.map_file import StoredMap
@@ -36,6 +44,7 @@ from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
+_OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
 
 
@@ -69,18 +78,27 @@ class MappedBag:
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
-    odometry = _odometry(recording, options)
+    return _mapped(recording, causes, _odometry(recording, options), options)
+
+
+def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, options: Namespace) -> MappedBag:
+    """Map a recording with an odometry that may be of the kind that was found. causes: what was mended so far."""
+    if odometry.kind is OdometryKind.HEADING and not _is_named(options):
+        recording = recording.without_positions()
     beams, companions = without_companions(recording.beams, recording.track)
     recording = replace(recording, beams=beams).corrected(options.parameters.part(BeamCorrection))
     extractor = EchoExtractor(options.parameters.echoes())
-    recording, scans, mounted = _heard(recording, extractor, options)
+    recording, scans, mounted, signs, over = _heard(recording, odometry, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     extracting = with_cells(extracting, scans, options.fixed)
-    signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
-    _warn_of_z_down(signs, options)
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
-    of_echoes = [*mounted, *echo_findings(scans, recording.sonar_in_base, replayed.corrections).causes]
+    found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
+    if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, replayed, options):
+        reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
+        cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
+        return _mapped(recording, [*causes, cause], OdometryFound(OdometryKind.HEADING, reason), options)
+    of_echoes = [*mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
     refined, refitted = None, []
     if options.refine:
@@ -94,7 +112,7 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     of_run = [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
-    causes = ranked([*causes, *companions, *of_run])
+    causes = ranked([*causes, *over, *companions, *of_run])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))
@@ -124,7 +142,8 @@ def _followed(
     """
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
     replayed = _replayed(recording, scans, parameters)
-    if _is_named(options) or odometry.kind is not OdometryKind.HEADING or not may_strafe(replayed.solver):
+    asked = odometry.kind is OdometryKind.HEADING and not _is_named(options) and _may_strafe(replayed)
+    if not asked or goes_on_with_other_ranges(replayed.solver.solution, recording.track):
         return odometry, parameters, replayed
     other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
     changed = with_odometry(extracting, other.kind, options.fixed)
@@ -134,17 +153,54 @@ def _followed(
     return odometry, parameters, replayed
 
 
+def _positions_mislead(
+    recording: Recording, scans: List[Scan], extracting: ReplayParameters, odometry: OdometryFound,
+    believed: Replayed, options: Namespace,
+) -> bool:  # fmt: skip
+    """Return whether scans go on clearly better without reported positions, where nobody named the odometry."""
+    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and _may_strafe(believed)
+    if not asked:
+        return False
+    alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
+    return goes_on_better(believed.solver.solution, alone.solver.solution)
+
+
+def _may_strafe(replayed: Replayed) -> bool:
+    return replayed.solver is not None and may_strafe(replayed.solver.solution)
+
+
+class _Heard(NamedTuple):
+    """recording: as its echoes place it. mounted: what was put right of its mount, because that is asked for.
+
+    over: whether the sonar was taken for upside down, as a cause; none where not.
+    """
+
+    recording: Recording
+    scans: List[Scan]
+    mounted: List[Cause]
+    signs: ZDownSigns
+    over: List[Cause]
+
+
 def _heard(
-    recording: Recording, extractor: EchoExtractor, options: Namespace
-) -> Tuple[Recording, List[Scan], List[Cause]]:
-    """Return the recording with its mount put right where that is asked for, its scans, and what was put right."""
-    scans = _scans(recording, extractor, options)
+    recording: Recording, odometry: OdometryFound, extractor: EchoExtractor, options: Namespace
+) -> _Heard:  # fmt: skip
+    """Return the scans of a recording, whose mount is put right where that is asked for.
+
+    Where a compass alone turns against the echoes, it is taken for mirrored: else nothing lies on what was heard.
+    """
+    scans, mended = _scans(recording, extractor, options), []
     found = echo_findings(scans, recording.sonar_in_base) if options.fix_mount else EchoFindings([], AS_TOLD)
-    if found.mount == AS_TOLD:
-        return recording, scans, []
-    mounted = recording.mounted(found.mount.turn, found.mount.is_over)
-    mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes]
-    return mounted, _scans(mounted, extractor, options), mended
+    if found.mount != AS_TOLD:
+        recording = recording.mounted(found.mount.turn, found.mount.is_over)
+        scans = _scans(recording, extractor, options)
+        mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes]
+    signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
+    _warn_of_z_down(signs, options)
+    if odometry.kind not in COMPASS_ONLY or not signs.turns().fires:
+        return _Heard(recording, scans, mended, signs, [])
+    mirrored = recording.mounted(0.0, True)
+    return _Heard(mirrored, _scans(mirrored, extractor, options), mended, signs, [_OVER])
 
 
 def _assumed_mount(mended: Sequence[Cause]) -> str:

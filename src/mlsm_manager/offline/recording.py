@@ -78,6 +78,11 @@ class Recording:
         ]
         return replace(self, beams=beams, track=track)
 
+    def without_positions(self) -> "Recording":
+        """Return the recording as a compass alone makes it."""
+        poses = self.track.poses
+        return self.with_track(self.track.with_poses(poses * [0.0, 0.0, 1.0])) if poses[:, :2].any() else self
+
     def mounted(self, turn: float, is_over: bool) -> "Recording":
         """Return the recording with the sonar turned by `turn` [rad] in base_link where it is, and the other way round
         where `is_over`.

@@ -4,8 +4,8 @@ from typing import Collection, Dict, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
+from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.offline.recording import Recording
@@ -23,7 +23,8 @@ _SMALLEST_CELL = 0.05
 _WORTH_TRYING = 0.75
 """Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
 strafing ones 0.57 and 0.66."""
-
+_CLEARLY = 0.03
+"""Share of the echoes that go on once positions are left out: .06 and more where these make no sense, else .01."""
 
 # A pose that is known to stay; one that seems to, by echoes that do not tell all directions as well: 5 mm/s, which they
 # hold back where they tell; and one that drifts as a head on a cable or a moored vehicle: 0.05 m/s for a minute.
@@ -116,9 +117,13 @@ def with_cells(parameters: ReplayParameters, scans: Sequence[Scan], fixed: Colle
     return parameters.changed({"resolution": min(cell, parameters.resolution)})
 
 
-def may_strafe(ahead: Optional[LiveSolver]) -> bool:
-    """Return whether scans do not go on in the run of a solver that expects the vehicle to go ahead."""
-    if ahead is None:
-        return False
-    shares = shares_heard_before(ahead.solution, 0)
-    return scans_go_on(ahead.log.node_times[1:], shares, _WORTH_TRYING).fires
+def may_strafe(ahead: Solution) -> bool:
+    """Return whether scans do not go on in a run that is solved as if the vehicle goes ahead, or as reported."""
+    return scans_go_on(ahead.log.node_times[1:], shares_heard_before(ahead, 0), _WORTH_TRYING).fires
+
+
+def goes_on_better(believed: Solution, alone: Solution) -> bool:
+    """Return whether scans go on in the run `alone`, and clearly better than in the one that is `believed`."""
+    shares, others = (shares_heard_before(run, 0) for run in (alone, believed))
+    gain = float(np.nanmean(shares) - np.nanmean(others))
+    return gain > _CLEARLY and not scans_go_on(alone.log.node_times[1:], shares).fires

@@ -5,30 +5,41 @@ from typing import List, NamedTuple, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult
+from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
+from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, fit_without, likeliest
-from mlsm_manager.odometry.faults import FaultKind, likely_faults
+from mlsm_manager.joint_solver.sonar_trials import (
+    SonarFault,
+    SonarKind,
+    changed_ranges,
+    fit_without,
+    likeliest,
+    likelihood_across,
+)
+from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, Fault
 from mlsm_manager.self_check.course import LARGEST, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
+from mlsm_manager.self_check.map_checks import scans_go_on
 from node_support.geometry import composed, inverse, rotated, transformed
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 _NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
+_NATS_ALONE = 15.0  # of ranges that change beside a compass alone: when, how much and how fast it went are all unknown
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
 _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
 _ROUNDS = 2
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
+_GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
 _FAULTS = 3  # at most, one after the other
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _FEWEST = 15  # nodes: fewer do not tell a change from noise
@@ -49,6 +60,11 @@ class MotionFindings:
     causes: List[Cause] = field(default_factory=list)
     apart: List[np.ndarray] = field(default_factory=list)
 
+    @property
+    def is_alone(self) -> bool:
+        """Whether a compass tells the motion alone."""
+        return bool(np.isinf(self.run.odometry.distance_deviation))
+
     def spread(self, times: np.ndarray) -> np.ndarray:
         """Return what these paths add to the covariances of the position at `times` (k,) [s], (k, 2, 2) m^2."""
         added = np.zeros((len(times), 2, 2))
@@ -60,8 +76,7 @@ class MotionFindings:
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount."""
         # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
-        alone = np.isinf(self.run.odometry.distance_deviation)
-        course, places = course_of(path, np.pi if alone else LARGEST), _places(self.run)
+        course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
         turned = course_causes(course) or self._calibration_causes()
@@ -104,10 +119,13 @@ class MotionFindings:
 
 
 class _Trial(NamedTuple):
+    """gain: of log likelihood, over the run as it was found before."""
+
     fault: Fault
     run: Solution
     fit: BatchResult
     track: Track
+    gain: float
 
 
 def motion_findings(
@@ -133,10 +151,10 @@ def motion_findings(
         if len(found.causes) == _FAULTS or not faults:
             break
         best = _best(found, faults)
-        gain = best.fit.log_likelihood - found.fit.log_likelihood
-        if gain < _NATS or not best.fault.is_beyond(errors.times[-1]):
+        needed = _NATS_ALONE if found.is_alone and best.fault.kind is SonarKind.RANGES else _NATS
+        if best.gain < needed or not best.fault.is_beyond(errors.times[-1]):
             break
-        found = _without(found, best, gain)
+        found = _without(found, best)
         suspected = [fault for fault in suspected if fault.kind is not best.fault.kind]
     others = [places, first] if found.causes else [places] if _errs(errors) else []
     return replace(found, apart=[other - _places(found.run) for other in others])
@@ -156,6 +174,8 @@ def _likely(errors: OdometryErrors) -> List[Fault]:
     if not _errs(errors):
         return []
     found = likely_faults(errors.times, errors.yaws, errors.headings, errors.scales)
+    if not errors.scales.any():
+        return [fault for fault in found if fault.kind not in OF_DISTANCES]
     changed = next(one for one in found if one.kind is FaultKind.DISTANCES)
     number = int(np.searchsorted(errors.times, changed.begin))
     begins = errors.times[max(number - _EARLIER, 1) : number + _LATER]
@@ -163,14 +183,35 @@ def _likely(errors: OdometryErrors) -> List[Fault]:
 
 
 def _of_sonar(found: MotionFindings) -> List[SonarFault]:
-    """Return faults of the sonar that make the run likelier, and are more than mounts usually err."""
-    return [fault for fault in likeliest(found.run, found.fit) if fault.is_beyond(found.fit.node_times[-1])]
+    """Return faults of the sonar that make the run likelier, and are more than mounts usually err.
+
+    With a compass alone no distance tells a change of ranges: what is heard before and after it must.
+    """
+    faults = [fault for fault in likeliest(found.run, found.fit) if fault.is_beyond(found.fit.node_times[-1])]
+    return faults + ([trial.fault for trial in _other_ranges(found)] if found.is_alone else [])
+
+
+def _other_ranges(found: MotionFindings) -> List[_Trial]:
+    """Return the trials of changes of ranges that make the run likelier."""
+    tried = (_tried(found, fault) for fault in changed_ranges(found.run))
+    return [trial for trial in tried if trial.gain > 0.0]
+
+
+def goes_on_with_other_ranges(run: Solution, track: Track) -> bool:
+    """Return whether scans of a run of a vehicle that goes ahead go on once a change of its ranges is taken out."""
+    fit = fit_of(run)
+    trials = _other_ranges(MotionFindings(replace(run, state=fit.state), fit, track))
+    best = max(trials, key=_gain, default=None)
+    if best is None or best.gain < _NATS_ALONE:
+        return False
+    shares = shares_heard_before(replace(best.run, state=best.fit.state), 0)
+    return not scans_go_on(run.log.node_times[1:], shares, _GO_ON).fires
 
 
 def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:
-    best = max((_tried(found, fault) for fault in faults), key=_likelihood)
+    best = max((_tried(found, fault) for fault in faults), key=_gain)
     for _ in range(_ROUNDS if isinstance(best.fault, SonarFault) else 1):
-        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_likelihood)
+        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_gain)
     return best
 
 
@@ -180,23 +221,35 @@ def _beside(fault: Fault) -> List[Fault]:
     others = [fault.times(factor) for factor in _BESIDE]
     if fault.kind is SonarKind.RANGES:
         others += [replace(fault, begin=fault.begin + seconds) for seconds in _SECONDS]
-    return others
+    return [other for other in others if other.is_possible]
 
 
 def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     if isinstance(fault, SonarFault):
-        return _Trial(fault, *fit_without(found.run, fault), found.track)
+        run, fit = fit_without(found.run, fault)
+        return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
     track = fault.mended(found.track)
     span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
     run = replace(found.run, log=found.run.log.since(0, OdometryLog.of(track)))
-    return _Trial(fault, run, fit_with(found.run, track, span), track)
+    fit = fit_with(found.run, track, span)
+    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood)
 
 
-def _likelihood(trial: _Trial) -> float:
-    return trial.fit.log_likelihood
+def _gained(found: MotionFindings, fault: SonarFault, run: Solution, fit: BatchResult) -> float:
+    if np.isnan(fault.begin):
+        return fit.log_likelihood - found.fit.log_likelihood
+    unchanged = replace(fault, sizes=(0.0,))
+    return likelihood_across(run, fit, fault) - likelihood_across(found.run, found.fit, unchanged)
 
 
-def _without(found: MotionFindings, trial: _Trial, gain: float) -> MotionFindings:
-    run = replace(trial.run, state=trial.fit.state)
-    cause = Cause(trial.fault.text, gain, trial.fault.begin, fault=trial.fault)
+def _gain(trial: _Trial) -> float:
+    return trial.gain
+
+
+def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:
+    run, fault = replace(trial.run, state=trial.fit.state), trial.fault
+    # With a compass alone it may as well be the ranges before it that are wrong, and with them the size of all.
+    is_size = found.is_alone and isinstance(fault, SonarFault) and fault.kind is SonarKind.RANGES
+    length = float(np.abs(np.expm1(-fault.sizes[0])) / np.sqrt(2.0)) if is_size else 0.0
+    cause = Cause(fault.text, trial.gain, fault.begin, length=length, fault=fault)
     return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

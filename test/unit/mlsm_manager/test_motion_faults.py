@@ -7,6 +7,7 @@ from benchmarks import rare_faults as rare
 from benchmarks.harness import mapped_as
 from made_recordings import SECONDS, touring
 
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
@@ -88,6 +89,14 @@ def test_a_current_moves_what_comes_after_it():
 )
 def test_what_echoes_correct_is_named_first(recording, said):
     assert_named_first(mapped_as(recording, "--refine").findings, said)
+
+
+@pytest.mark.long
+@pytest.mark.newest_only("slow; a run is mapped three times")
+def test_positions_that_go_elsewhere_are_left_out():
+    found = mapped_as(rare.odometry_drifts(WHOLE.without_positions(), 0.0, 0.1))
+    assert found.odometry.kind is OdometryKind.HEADING
+    assert "mended: reported positions do not go where the echoes tell" in found.findings.trust.line
 
 
 @pytest.mark.long

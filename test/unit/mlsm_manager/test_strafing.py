@@ -66,7 +66,7 @@ def test_echoes_tell_that_it_strafes(ahead, hovering):
 
 
 def test_a_short_run_does_not_tell(ahead):
-    assert not may_strafe(ahead)
+    assert not may_strafe(ahead.solution)
 
 
 def test_refined_it_is_as_near_as_echoes_tell():
