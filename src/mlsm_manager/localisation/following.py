@@ -8,6 +8,7 @@ import numpy as np
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.live_correction import LiveCorrection
 from mlsm_manager.localisation.place_now import FixAge, PlaceNow
+from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
 from mlsm_manager.odometry.trembling import with_trembling_smoothed
@@ -23,6 +24,7 @@ class Following:
     """A correction can be asked for while a scan is being matched, by another thread.
 
     live: what is shown. odometry: what it did that no vehicle does is left out. found: what the newest scans show.
+    resumed_at: the stored place from which the vehicle goes on; None where it does not.
     """
 
     def __init__(self, limits: MotionLimits, blend_time: float, clock: Callable[[], float]) -> None:
@@ -33,12 +35,17 @@ class Following:
         self.found = LiveCauses()
         self._clock = clock
         self._came: Optional[Tuple[float, float]] = None
+        self.resumed_at: Optional[StoredPlace] = None
 
     def clear(self) -> None:
         """Forget everything, because time jumped or the map is gone."""
         for part in (self.live, self.odometry, self._age, self.found):
             part.clear()
-        self._came = None
+        self._came = self.resumed_at = None
+
+    def bridged(self, track: Track) -> Track:
+        """Return a track that begins where the vehicle was when its place was stored; see StoredPlace.bridged."""
+        return track if self.resumed_at is None else self.resumed_at.bridged(track)
 
     def taken(self, scan: Scan) -> Scan:
         """Learn a scan's odometry, and return the scan with one that goes on, which does not tremble."""

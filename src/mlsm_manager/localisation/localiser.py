@@ -78,12 +78,12 @@ class Localiser:
         """
         self.estimator = estimator
         self._lock = threading.RLock()
-        self._changes = 0
+        self.changes = 0
+        """A number that grows whenever the map or the pose in it changes."""
         self.following = Following(limits, settings.blend_time, clock)
         """What is known between scans."""
         self._newest: Deque[Scan] = deque(maxlen=_NEWEST)
         self._search = PlaceSearch()
-        self._resumed_at: Optional[StoredPlace] = None
         self.origin: Optional[Origin] = None
         """Where the map lies on the Earth, where that is known."""
         self.use(settings)
@@ -95,11 +95,6 @@ class Localiser:
             self.estimator.matcher = settings.matcher
             self.following.live.blend_time = settings.blend_time
 
-    @property
-    def matching(self) -> bool:
-        """Whether scans are matched with the map, or placed by the odometry."""
-        return self.estimator.matching
-
     def match(self, matching: bool) -> bool:
         """Turn matching on or off; return whether that is a change.
 
@@ -109,11 +104,6 @@ class Localiser:
             changed = self.estimator.matching != matching
             self.estimator.matching = matching
         return changed
-
-    @property
-    def lookahead(self) -> float:
-        """Seconds of odometry after the end of a scan that are waited for before the scan is taken."""
-        return self.estimator.lookahead
 
     def mount(self, sonar_in_base: np.ndarray) -> None:
         """Learn where the sonar is in base_link, (2,) m."""
@@ -150,7 +140,7 @@ class Localiser:
         """Match a scan and put it, and the clouds that waited for it, into the map."""
         with self._lock:
             self.notice_time(scan.reference_time)
-            self._changes += 1
+            self.changes += 1
             reported, scan = scan, self.following.taken(scan)
             self._newest.append(scan)
             update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
@@ -166,13 +156,13 @@ class Localiser:
         """Put a cloud into the map, or let it wait for the scan of its time."""
         with self._lock:
             self.notice_time(cloud.end)
-            self._changes += 1
+            self.changes += 1
             return self.estimator.add_cloud(self.following.cloud(cloud))
 
     def take_points(self, points: np.ndarray) -> CloudUpdate:
         """Put points (n, 4) that are in map already into the map."""
         with self._lock:
-            self._changes += 1
+            self.changes += 1
             return self.estimator.add_points(points)
 
     @property
@@ -236,10 +226,6 @@ class Localiser:
             detail = f"by {until - time:.1f} s, since the odometry was followed without them; the machine is too slow"
             raise RefusedInput("scans too late", detail)
 
-    def bridged(self, track: Track) -> Track:
-        """Return a track that begins where the vehicle was when its place was stored; see StoredPlace.bridged."""
-        return track if self._resumed_at is None else self._resumed_at.bridged(track)
-
     def silent_since(self, time: float) -> Optional[float]:
         """Return the time [s] of the belief when it is so old at `time` that `follow` must be called, else None."""
         until = self.believed_until
@@ -289,11 +275,6 @@ class Localiser:
     def is_expected(self) -> bool:
         """Whether the next scans are searched about where the vehicle is expected."""
         return self._search.may_be_near
-
-    @property
-    def changes(self) -> int:
-        """A number that grows whenever the map or the pose in it changes."""
-        return self._changes
 
     @property
     def blocks(self) -> Blocks:
@@ -354,12 +335,12 @@ class Localiser:
         origin = stored.origin
         with self._lock:
             reason = self.estimator.restore(stored.layers, stored.arrays if same_odometry else {})
-            self._changes += 1
+            self.changes += 1
             self.origin = origin
             self._forget_scans()
             self._search.lose()
             place = StoredPlace.of_arrays(stored.arrays) if same_odometry else None
-            self._resumed_at = place
+            self.following.resumed_at = place
             if place is not None:
                 self._expect(place.correction, place.widened)
         return reason
@@ -368,7 +349,7 @@ class Localiser:
         """Forget map and place; return how many blocks the map had."""
         with self._lock:
             count = self.block_count
-            self._changes += 1
+            self.changes += 1
             self.origin = None
             self.estimator.clear()
             self._forget_scans()
@@ -378,4 +359,3 @@ class Localiser:
     def _forget_scans(self) -> None:
         self.following.clear()
         self._newest.clear()
-        self._resumed_at = None

@@ -213,7 +213,9 @@ def replay(
     corrections, updates, refused, seconds = np.empty((len(track.times), 3)), [], Counter(), []
     done = 0
     for scan in scans:
-        known = max(done, int(np.searchsorted(track.times, scan.reference_time + localiser.lookahead, side="left")))
+        known = max(
+            done, int(np.searchsorted(track.times, scan.reference_time + localiser.estimator.lookahead, side="left"))
+        )
         corrections[done:known] = _corrections(localiser, track, done, known)
         done, start = known, process_time()
         try:

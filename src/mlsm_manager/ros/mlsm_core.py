@@ -138,7 +138,7 @@ class MlsmCore:
         taken = self._localiser.take_scan(scan)
         for update in taken.clouds:
             self._report_cloud(update, cloud.stamp_ns)
-        report_scan(self.health, taken.scan, self._localiser.matching)
+        report_scan(self.health, taken.scan, self._localiser.estimator.matching)
         if taken.scan.found:
             rospy.loginfo("%s: found again after a silence of the sonar: %s", self.health.name, taken.scan.found)
         if taken.scan.loop:
@@ -190,13 +190,13 @@ class MlsmCore:
         known = self._localiser.believed_until
         start = min([time, *times[:1], *([] if known is None else [known])])
         try:
-            track = self._odometry.track(start, times, time, self._localiser.lookahead)
+            track = self._odometry.track(start, times, time, self._localiser.estimator.lookahead)
         except RefusedInput:
             self.health.count("scans not used")
-            if self._localiser.matching:
+            if self._localiser.estimator.matching:
                 raise
             return None
-        scan = Scan.from_stamps(cloud.points, cloud.time_stamps, time, self._localiser.bridged(track))
+        scan = Scan.from_stamps(cloud.points, cloud.time_stamps, time, self._localiser.following.bridged(track))
         known = scan.with_odometry()
         # A node that was started within a scan has no odometry of its beginning: it has no reason to warn.
         self.health.count("echoes without odometry", len(scan) - len(known))

@@ -137,7 +137,7 @@ def test_a_run_goes_on_with_a_scan_whose_first_half_lacks_odometry(stored, whole
     _, wanted = whole
     localiser, scan = resumed(stored), HARBOUR.scans[KILLED_AFTER]
     known = scan.track.times > scan.reference_time - TURN / 2.0
-    track = localiser.bridged(Track(scan.track.times[known], scan.track.poses[known]))
+    track = localiser.following.bridged(Track(scan.track.times[known], scan.track.poses[known]))
     (update,) = taken(localiser, [replace(scan, track=track).with_odometry()])
     assert len(update.scan) == len(scan)
     np.testing.assert_allclose(update.belief.theta[:2], wanted[KILLED_AFTER].belief.theta[:2], atol=0.1)

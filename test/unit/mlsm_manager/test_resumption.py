@@ -64,7 +64,7 @@ def test_a_track_that_begins_after_the_restart_goes_straight_from_the_stored_pla
     localiser = restored(stored, same_odometry=True)
     end = StoredPlace.of_arrays(stored.arrays).belief.time
     track = Track(np.array([end + 8.0, end + 9.0]), np.array([[0.8, 0.4, 0.0], [0.9, 0.5, 0.0]]))
-    bridged = localiser.bridged(track)
+    bridged = localiser.following.bridged(track)
     np.testing.assert_allclose(bridged.at(end), drifting(4).reference_pose, atol=1e-9)
     np.testing.assert_array_equal(bridged.at(track.times), track.poses)
 
@@ -74,7 +74,7 @@ def test_a_track_stays_as_it_is_where_the_stored_place_says_nothing_of_it(stored
     localiser = restored(stored, same_odometry)
     end = StoredPlace.of_arrays(stored.arrays).belief.time
     track = Track(np.array([end + later]), np.zeros((1, 3)))
-    assert localiser.bridged(track) is track
+    assert localiser.following.bridged(track) is track
 
 
 def test_another_odometry_is_found_anywhere_in_the_map(stored):
