@@ -121,8 +121,8 @@ def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
 
 
 def test_late_beams_make_it_wait_for_odometry():
-    assert localiser_after(0, sonar_delay_deviation=0.0)[0].lookahead == 0.0
-    assert localiser_after(0, sonar_delay_deviation=0.1)[0].lookahead == pytest.approx(0.3)
+    assert localiser_after(0, sonar_delay_deviation=0.0)[0].estimator.lookahead == 0.0
+    assert localiser_after(0, sonar_delay_deviation=0.1)[0].estimator.lookahead == pytest.approx(0.3)
 
 
 def test_free_space_is_known_between_the_vehicle_and_the_walls(run):
