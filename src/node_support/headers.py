@@ -55,18 +55,18 @@ def check_stamp(stamp_ns: int, references_ns: Iterable[int] = (), tolerance: flo
         )
 
 
-def check_point_stamps(stamps: np.ndarray, stamp_ns: int, tolerance: float = DAY) -> None:
-    """Raise RefusedInput unless the times [s] of points, signs left out, are within `tolerance` [s] of their cloud's.
+def check_point_stamps(stamps: np.ndarray, stamp_ns: int) -> None:
+    """Raise RefusedInput unless the times [s] of points, signs left out, are within a day of their cloud's.
 
     stamps: (n,) float64; those that are not finite belong to points that are left out, and pass.
     """
     distances = np.abs(np.abs(stamps[np.isfinite(stamps)]) - stamp_ns / _NANOSECONDS)
-    wrong = np.count_nonzero(distances > tolerance)
+    wrong = np.count_nonzero(distances > DAY)
     if wrong:
         raise RefusedInput(
             STAMPS_REFUSED,
             f"{wrong} of {stamps.size} timeStamps are up to {distances.max():.6g} s from the cloud's stamp, "
-            f"must be at most {tolerance:g} s; check the publisher",
+            f"must be at most {DAY:g} s; check the publisher",
         )
 
 

@@ -9,7 +9,7 @@ from mlsm_manager.hovering.particle_filter import ParticleFilter, on_path
 from mlsm_manager.hovering.particles import echoes_of_run
 from mlsm_manager.hovering.path_agreement import log_likelihood
 from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
-from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_path, solved
+from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of, fit_path
 from mlsm_manager.joint_solver.estimate import misfit_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
@@ -28,7 +28,8 @@ def solved_best(live: LiveSolver) -> BatchResult:
 
     Places that differ between fits that are about as likely are uncertain by as much.
     """
-    fits = [solved(live), *(solved(live, start=_found(live, seed)) for seed in range(1, _FILTERS + 1))]
+    starts = [live.state, *(_found(live, seed) for seed in range(1, _FILTERS + 1))]
+    fits = [fit_of(live.solution.with_state(start)) for start in starts]
     search = _shift_search(live)
     likelihoods = [search.judged(_path(live, fit.state)).log_likelihood for fit in fits]
     for better in _shifted(live, search, fits, max(likelihoods) + _CLEARLY):
@@ -68,7 +69,7 @@ def _shifted(live: LiveSolver, search: ShiftSearch, fits: List[BatchResult], lea
         return []
     best = [stretched_mean(search, climbed[0].path), *climbed[1:]]
     starts = [_on_path(live, one.path) for one in best]
-    return [solved(live, start=start, fixed_steps=start) for start in starts]
+    return [fit_of(live.solution.with_state(start), start) for start in starts]
 
 
 def _on_path(live: LiveSolver, path: np.ndarray) -> State:

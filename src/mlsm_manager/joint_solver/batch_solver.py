@@ -1,6 +1,6 @@
 """Fits a whole run at once, starting from what the live solver found."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -20,7 +20,6 @@ from mlsm_manager.joint_solver.normal_equations import (
     State,
     solution_of,
 )
-from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian
 from mlsm_manager.joint_solver.solution import Solution
@@ -96,28 +95,16 @@ def with_loops_closed(live: LiveSolver, batch: BatchResult) -> LoopClosure:
     problem = _Batch(live.solution.with_state(batch.state.copy()), loops)
     for _ in range(_PULLED_STEPS):
         problem.step()
-    other = solved(live, start=problem.state)
+    other = fit_of(live.solution.with_state(problem.state))
     gain = other.log_likelihood - batch.log_likelihood
     return LoopClosure(other, loops, gain) if gain > _CONVINCING else LoopClosure(batch, [], gain)
 
 
-def solved(
-    live: LiveSolver,
-    parameters: Optional[SolverParameters] = None,
-    start: Optional[State] = None,
-    fixed_steps: Optional[State] = None,
-) -> BatchResult:
-    """Return the fit of all scans that `live` has taken; its own state stays as it is.
-
-    parameters, start: others than those of `live`, with the same odometry. fixed_steps: unknowns whose
-    steps are known to _FIXED_STEP; None where none are.
-    """
-    parameters, start = parameters or live.parameters, start or live.state
-    return fit_of(replace(live.solution, parameters=parameters, state=start), fixed_steps)
-
-
 def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
-    """Return the fit of a whole run that begins at its state; arguments as those of `solved`."""
+    """Return the fit of a whole run that begins at its state, which stays as it is.
+
+    fixed_steps: unknowns whose steps are known to _FIXED_STEP; None where none are.
+    """
     problem = _Batch(run.with_state(run.state.copy()), fixed_steps=fixed_steps)
     steps, converged = problem.converge()
     poses, of_run = problem.covariances()

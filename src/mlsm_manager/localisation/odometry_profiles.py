@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, solved
+from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import Compass, OdometryModel
 from mlsm_manager.joint_solver.parameters import NodeSearch
@@ -288,7 +288,7 @@ PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
 def fitted(solver: LiveSolver) -> BatchResult:
     """Return the fit of a whole run: from several paths where echoes alone tell the motion within a turn."""
     if solver.parameters.node_search is None:
-        return solved(solver)
+        return fit_of(solver.solution)
     from mlsm_manager.hovering.best_fit import solved_best
 
     return solved_best(solver)

@@ -73,10 +73,14 @@ class Recording:
         """Return the recording with another T_odom_base, which the beams follow."""
         times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
         moves = matrices(composed(track.at(times), inverse(self.track.at(times))))
-        beams = [
-            replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in zip(self.beams, moves)
-        ]
-        return replace(self, beams=beams, track=track)
+        return replace(self._moved(moves), track=track)
+
+    def _moved(self, moves: np.ndarray) -> "Recording":
+        """Return the recording with its beams moved in odom, each by one of `moves` (n, 4, 4)."""
+        pairs = zip(self.beams, moves)
+        return replace(
+            self, beams=[replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in pairs]
+        )
 
     def without_positions(self) -> "Recording":
         """Return the recording as a compass alone makes it."""
@@ -91,12 +95,7 @@ class Recording:
         about = np.append(self.sonar_in_base, turn)
         over = np.diag([1.0, -1.0, -1.0, 1.0]) if is_over else np.eye(4)
         move = matrices(about[np.newaxis])[0] @ over @ matrices(inverse(np.append(about[:2], 0.0))[np.newaxis])[0]
-        there, back = matrices(poses) @ move, matrices(inverse(poses))
-        beams = [
-            replace(placed, T_target_sonar=one @ other @ placed.T_target_sonar)
-            for placed, one, other in zip(self.beams, there, back)
-        ]
-        return replace(self, beams=beams)
+        return self._moved(matrices(poses) @ move @ matrices(inverse(poses)))
 
     @property
     def sonar_in_base(self) -> np.ndarray:

@@ -25,12 +25,12 @@ OfMoves = Callable[[np.ndarray], np.ndarray]
 """From moves (k, 3) of a fit's pose, x y [m] yaw [rad], to a value (k,) of each."""
 
 
-def significance(matched_shares: OfMoves, seed: int = 0) -> float:
+def significance(matched_shares: OfMoves) -> float:
     """Return by how many standard deviations the matched share of a fit beats that of other places.
 
     The other places lie up to 8 m away with any heading.
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(0)
     places = rng.uniform(-_SHIFT, _SHIFT, (_PLACES, 2))
     moves = np.column_stack([places, rng.uniform(-np.pi, np.pi, _PLACES)])
     shares = matched_shares(np.vstack([np.zeros(3), moves]))

@@ -2,7 +2,7 @@
 
 import math
 from functools import lru_cache
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import genpy
 import numpy as np
@@ -95,11 +95,11 @@ def point_cloud(
     )
 
 
-def cloud_to_message(cloud: Cloud, points: Optional[PointCloud2] = None) -> StampedIntensityCloud:
-    """Return the StampedIntensityCloud of a cloud; `points` is its PointCloud2 where that exists already."""
+def cloud_to_message(cloud: Cloud) -> StampedIntensityCloud:
+    """Return the StampedIntensityCloud of a cloud."""
     return StampedIntensityCloudArrays(
         header=header(cloud.stamp_ns, cloud.frame_id),
-        cloud=points or points_to_message(cloud),
+        cloud=points_to_message(cloud),
         timeStamps=np.ascontiguousarray(cloud.time_stamps, dtype="<f8"),
     )
 

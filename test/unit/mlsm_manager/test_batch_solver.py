@@ -8,7 +8,7 @@ from made_harbour import logged, that_heard, tour
 from made_loops import astray
 from made_models import followed, solver_parameters
 
-from mlsm_manager.joint_solver.batch_solver import LoopClosure, solved, solved_part, with_loops_closed
+from mlsm_manager.joint_solver.batch_solver import LoopClosure, fit_of, solved_part, with_loops_closed
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.normal_equations import DELAY, RUN_COLUMNS
@@ -43,7 +43,7 @@ def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift
     made = tour(40)
     scans, track = astray(made, np.array(drift))
     solver = not_found_live(scans)
-    without = solved(solver)
+    without = fit_of(solver.solution)
     found = with_loops_closed(solver, without)
     assert errors(solver, without, track, made).mean() > 5.0
     assert errors(solver, found.batch, track, made).mean() < 1.0
@@ -54,7 +54,7 @@ def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift
 @slow
 def test_a_run_that_is_not_astray_has_no_loops():
     solver = followed(tour(40).scans)
-    batch = solved(solver)
+    batch = fit_of(solver.solution)
     found = with_loops_closed(solver, batch)
     assert found.batch is batch
     assert found.to_mapping() == {"gain": None, "found": []}
@@ -84,7 +84,7 @@ def test_a_canal_makes_no_loops():
         return that_heard(scan, made.truth, heard)
 
     solver = followed([between_walls(scan) for scan in made.scans])
-    batch = solved(solver)
+    batch = fit_of(solver.solution)
     assert loops_of(solver.solution.with_state(batch.state)) == []
 
 
@@ -116,7 +116,7 @@ def among_furrows(scan, truth, rng):
 
 def verdicts_of(scans):
     solver = followed(scans)
-    return {verdict.name: verdict for verdict in refitted_verdicts(solver.solution, solved(solver))}
+    return {verdict.name: verdict for verdict in refitted_verdicts(solver.solution, fit_of(solver.solution))}
 
 
 @pytest.fixture(scope="module")
@@ -163,7 +163,7 @@ def part():
 
 @slow
 def test_it_finds_what_a_run_of_its_scans_alone_finds(part):
-    alone = solved(followed(WALLS[FIRST:]))
+    alone = fit_of(followed(WALLS[FIRST:]).solution)
     np.testing.assert_allclose(part.run, alone.state.run, atol=0.01)
     np.testing.assert_allclose(part.node[2:], alone.state.nodes[-1, 2:], atol=0.005)
     np.testing.assert_allclose(part.covariance[-RUN_COLUMNS:, -RUN_COLUMNS:], alone.run_covariance, rtol=0.1)
@@ -171,5 +171,5 @@ def test_it_finds_what_a_run_of_its_scans_alone_finds(part):
 
 @slow
 def test_it_knows_the_delay_less_well_than_the_whole_run(part):
-    whole = solved(followed(WALLS))
+    whole = fit_of(followed(WALLS).solution)
     assert part.covariance[-RUN_COLUMNS:, -RUN_COLUMNS:][DELAY, DELAY] > whole.run_covariance[DELAY, DELAY]

@@ -7,7 +7,7 @@ import pytest
 from made_harbour import SONAR_IN_BASE, ahead, reporting, tour
 from made_models import followed
 
-from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.hypotheses import Doubt, Hypotheses, likelier
 from mlsm_manager.joint_solver.motion_models import SCALE
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -95,13 +95,13 @@ def test_the_fit_of_a_whole_run_takes_what_all_its_echoes_speak_for(scale):
     hypotheses = Hypotheses.begun(AUTO, SONAR_IN_BASE)
     taken(hypotheses, scans_of(scale))
     hypotheses.show_other()  # what is wrong
-    fit = hypotheses.believed([solved(solver) for solver in hypotheses.solvers])
+    fit = hypotheses.believed([fit_of(solver.solution) for solver in hypotheses.solvers])
     assert fit.state.nodes[-1, SCALE] == pytest.approx(scale, abs=0.05)
     assert fit.state.nodes.shape[1] == hypotheses.shown.odometry.width
 
 
 def test_a_scale_that_does_not_change_is_the_same_all_along_a_fit():
-    scales = solved(run(0.3)[0].shown).state.nodes[:, SCALE]
+    scales = fit_of(run(0.3)[0].shown.solution).state.nodes[:, SCALE]
     assert np.ptp(scales) < 1e-6
 
 

@@ -7,7 +7,7 @@ import pytest
 from made_harbour import SONAR_IN_BASE, TURN, deaf, tour, with_wild_odometry
 from made_models import DVL_ODOMETRY, followed, solver_parameters
 
-from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import DIRECTION
 from mlsm_manager.joint_solver.normal_equations import DELAY
@@ -34,7 +34,7 @@ def live(made):
 
 @pytest.fixture(scope="module")
 def batch(live):
-    return solved(live)
+    return fit_of(live.solution)
 
 
 @pytest.fixture(scope="module")
@@ -92,7 +92,7 @@ def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(m
 def test_the_same_scans_give_the_same_bytes(made, live, batch):
     again = followed(made.scans)
     assert again.state.nodes.tobytes() == live.state.nodes.tobytes()
-    assert solved(again).state.nodes.tobytes() == batch.state.nodes.tobytes()
+    assert fit_of(again.solution).state.nodes.tobytes() == batch.state.nodes.tobytes()
 
 
 def test_points_moved_by_a_nanometre_move_the_path_by_less_than_a_millimetre(made, live, batch):
@@ -101,7 +101,7 @@ def test_points_moved_by_a_nanometre_move_the_path_by_less_than_a_millimetre(mad
     other = followed(moved)
     found, known = ([e.node for e in solver.estimates] for solver in (other, live))
     np.testing.assert_allclose(found, known, atol=1e-6)
-    np.testing.assert_allclose(solved(other).state.nodes, batch.state.nodes, atol=1e-6)
+    np.testing.assert_allclose(fit_of(other.solution).state.nodes, batch.state.nodes, atol=1e-6)
 
 
 def test_a_scan_that_is_not_newer_is_refused_and_changes_nothing(made):

@@ -7,7 +7,7 @@ import pytest
 from made_harbour import CANAL, ahead, along_canal, deaf, reporting, selected, tour
 from made_models import COMPASS, followed
 
-from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.estimate import scale_covariance
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, solution_of
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
@@ -218,7 +218,7 @@ def test_in_a_straight_canal_the_told_deviation_covers_the_error():
 def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
     canal = tour(15, noise=0.3, path=along_canal, corners=CANAL)
     scans = [unheard_beyond(scan, 30.0) for scan in canal.scans]
-    batch = solved(followed(scans, parameters(OdometryKind.HEADING, free_scans=5)))
+    batch = fit_of(followed(scans, parameters(OdometryKind.HEADING, free_scans=5)).solution)
     assert batch.converged
     assert batch.steps < 15
 

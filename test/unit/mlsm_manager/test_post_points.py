@@ -5,7 +5,7 @@ import pytest
 from made_models import HEADING, followed, solver_parameters
 from made_posts import SPEED, cluttered, heard, true_path
 
-from mlsm_manager.joint_solver.batch_solver import solved
+from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.surface_points import Sights, SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
@@ -95,7 +95,7 @@ def gone(solver, nodes):
 
 
 def test_posts_tell_the_way_along_a_canal(with_posts):
-    for nodes in (with_posts.state.nodes, solved(with_posts).state.nodes):
+    for nodes in (with_posts.state.nodes, fit_of(with_posts.solution).state.nodes):
         found, true = gone(with_posts, nodes)
         assert found == pytest.approx(true, abs=1.5)
 
