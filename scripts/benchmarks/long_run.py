@@ -1,10 +1,11 @@
 """Prints what a scan costs the localiser, map included, after 100 scans and after many, on a tour that never ends."""
 
-import resource
+import os
 import time
 from typing import Iterator
 
 import numpy as np
+from soaking.processes import held
 
 from benchmarks.harness import benchmark_parser
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -86,16 +87,11 @@ def main() -> None:
         if number in _MEASURED_AT or number == scans:
             spent, most = (1e3 * float(statistic(seconds[-_AVERAGED:])) for statistic in (np.median, np.max))
             error = position_error(number, belief.theta[:3])
+            memory = held(os.getpid()).memory
             print(
-                f"{number} scans: {spent:.0f} ms a scan, {most:.0f} ms at most, {memory():.0f} MB, {error:.2f} m from "
+                f"{number} scans: {spent:.0f} ms a scan, {most:.0f} ms at most, {memory:.0f} MB, {error:.2f} m from "
                 "the truth", flush=True,
             )  # fmt: skip
-
-
-def memory() -> float:
-    """Return what the process holds now, MB."""
-    with open("/proc/self/statm") as file:
-        return int(file.read().split()[1]) * resource.getpagesize() / 1e6
 
 
 def position_error(number: int, T_map_base: np.ndarray) -> float:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Sequence
 
+from soaking.processes import held
+
 from fuzz_files.samples import FILE, OUT, Sample
 from mlsm_manager.map_tool import run_map_tool
 from mlsm_manager.migrate_yaml import run_migrate_yaml
@@ -66,7 +68,7 @@ def run(sample: Sample, command: Sequence[str], path: Path, folder: Path) -> Run
     folder.mkdir()
     said, out = folder / "stderr.txt", folder / "out"
     out.mkdir()
-    before = _resident()
+    before = 1e6 * held(os.getpid()).memory
     child = os.fork()
     if child == 0:
         _child(sample, [word.replace(FILE, str(path)).replace(OUT, str(out)) for word in command], said)
@@ -100,8 +102,3 @@ def _child(sample: Sample, command: List[str], said: Path) -> None:
     finally:
         sys.stderr.flush()
         os._exit(status)
-
-
-def _resident() -> float:
-    """Return the bytes of memory that this process holds."""
-    return float(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")

@@ -1,6 +1,7 @@
 """scripts/soak: a mission of many hours through the live graph, and what grew in the course of it."""
 
 import argparse
+import math
 import os
 import shutil
 import signal
@@ -11,14 +12,16 @@ from pathlib import Path
 from typing import List
 
 import rospy
+import yaml
 from benchmarks.harness import print_table
 from run_demo import ROOT, DemoError, Graph
 
-from soaking.laps import lap_script
 from soaking.listening import Listener
 from soaking.processes import held_below
 from soaking.verdicts import Sample, rows
 
+_BACK = {"x": 18, "y": -11, "yaw_deg": 250 - 360, "seconds": 31.6}
+"""From the end of the basin's tour to its start."""
 _FACTOR = 1000.0  # times real time: more than any machine can
 _BETWEEN_SAMPLES = 1.0 / 60.0  # h, simulated
 _AT_REST = 5.0  # s of the wall clock after the last beam, in which /diagnostics tells of it
@@ -32,7 +35,7 @@ def soak(options: argparse.Namespace, folder: Path) -> bool:
     Raises DemoError when it does not go on.
     """
     script = folder / "moves.yaml"
-    script.write_text(lap_script(ROOT / "yaml/basin_tour.yaml", options.hours))
+    script.write_text(_laps(options.hours))
     os.environ["ROS_LOG_DIR"] = str(folder / "logs")
     settings = {"script": script, "map_directory": folder / "maps", "rviz": "false", "real_time_factor": _FACTOR}
     arguments = [f"{name}:={value}" for name, value in settings.items()]
@@ -56,6 +59,14 @@ def soak(options: argparse.Namespace, folder: Path) -> bool:
         return all(row.holds for row in table)
     finally:
         graph.stop()
+
+
+def _laps(hours: float) -> str:
+    """Return a script of moves, as YAML, that repeats the demo's tour for `hours` or a little longer."""
+    script = yaml.safe_load((ROOT / "yaml/basin_tour.yaml").read_text())
+    lap = [*script["moves"], _BACK]
+    seconds = sum(move.get("seconds", 0.0) + move.get("wait", 0.0) for move in lap)
+    return yaml.safe_dump({"start": script["start"], "moves": lap * math.ceil(3600.0 * hours / seconds)})
 
 
 def _sample_all(graph: Graph, listener: Listener, folder: Path, samples: List[Sample]) -> None:

@@ -23,7 +23,7 @@ def held_below(pid: int) -> Dict[str, Held]:
     found = {}
     for child in _descendants(pid):
         try:
-            found[_name(child)] = _held(child)
+            found[_name(child)] = held(child)
         except (FileNotFoundError, ProcessLookupError):
             continue  # it has just ended
     return found
@@ -54,7 +54,8 @@ def _name(pid: int) -> str:
     return (names or programs or [str(pid)])[0]
 
 
-def _held(pid: int) -> Held:
+def held(pid: int) -> Held:
+    """Return what a process holds now."""
     fields = _stat(pid)
     resident = int(Path(f"/proc/{pid}/statm").read_text().split()[1])
     ticks = int(fields[11]) + int(fields[12])

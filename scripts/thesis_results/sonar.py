@@ -57,17 +57,13 @@ _SETTINGS_852 = {
 def make_simulated(pictures: Pictures) -> str:
     """Return the section of what the models hear."""
     figure, axes = new_figure(15.0, 11.0, len(_VIEWS), 1 + len(ECHO_MODELS))
-    angles = np.arange(_BEAMS) * 2.0 * math.pi / _BEAMS
     for row, (name, place, reach) in zip(axes, _VIEWS):
         world = load_world(ROOT / f"worlds/{name}.sdf").world
         draw_world(row[0], world, place)
         row[0].plot(0.0, 0.0, "r.")
         to_scale(row[0], f"{name}, from above", reach)
         for cell, model_name in zip(row[1:], ECHO_MODELS):
-            model = make_echo_model(model_name, {"max_range": reach})
-            sonar = Sonar(RayCaster(world), SonarParameters().pattern(), model, np.random.default_rng(1))
-            poses = np.repeat(pose_matrix(place)[np.newaxis], _BEAMS, axis=0)
-            image = draw_turn(cell, Turn(angles, sonar.pings(poses, angles), reach))
+            image = draw_turn(cell, _simulated_turn(world, place, model_name, reach))
             to_scale(cell, model_name, reach)
             cell.set(ylabel="")
     figure.colorbar(image, ax=axes[:, -1], shrink=0.4, label="echo strength, one scale for all")
@@ -92,11 +88,7 @@ def make_852(pictures: Pictures) -> str:
         settings = HeadSettings(frequency_khz=850, **changes)
         draw_turn(cell, _turn_of_852(world, settings))
         to_scale(cell, f"{title}: {settings.max_range} m, gain {settings.start_gain_db} dB", settings.max_range)
-    model = make_echo_model("laser_cone", {"max_range": _REACH_852})
-    sonar = Sonar(RayCaster(world), SonarParameters().pattern(), model, np.random.default_rng(1))
-    angles = np.arange(_BEAMS) * 2.0 * math.pi / _BEAMS
-    poses = np.repeat(pose_matrix(_PLACE_852)[np.newaxis], _BEAMS, axis=0)
-    image = draw_turn(axes[-1], Turn(angles, sonar.pings(poses, angles), _REACH_852))
+    image = draw_turn(axes[-1], _simulated_turn(world, _PLACE_852, "laser_cone", _REACH_852))
     to_scale(axes[-1], f"(d) the simulator's laser_cone: {_REACH_852:g} m", _REACH_852)
     figure.colorbar(image, ax=axes[-1], shrink=0.6, label="echo strength")
     return joined(
@@ -106,6 +98,13 @@ def make_852(pictures: Pictures) -> str:
         real head, 5 m before the long wall; `laser_cone` (d) has that of the thesis, 1 m."""),
         pictures.save("imagenex_852", figure, "One turn each from one place. Compare with figure 7.1 of the thesis."),
     )
+
+
+def _simulated_turn(world: World, place: tuple, model_name: str, reach: float) -> Turn:
+    """Return what a model with its defaults hears from a place [m] up to a reach [m]."""
+    model, angles = make_echo_model(model_name, {"max_range": reach}), np.arange(_BEAMS) * 2.0 * math.pi / _BEAMS
+    sonar = Sonar(RayCaster(world), SonarParameters().pattern(), model, np.random.default_rng(1))
+    return Turn(angles, sonar.pings(np.repeat(pose_matrix(place)[np.newaxis], _BEAMS, axis=0), angles), reach)
 
 
 def _turn_of_852(world: World, settings: HeadSettings) -> Turn:
