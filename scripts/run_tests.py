@@ -22,8 +22,8 @@ STEP_TIMEOUT = 1200.0
 SPARE_TIMEOUT = 3600.0
 # Rostests mostly wait; each has a master of its own.
 TOGETHER = 3
-# Spare steps at once: as many as leave no processor idle while the others wait.
-SPARE_TOGETHER = 2
+# Spare steps at once: as many as leave no processor idle while the others wait, also where one of them waits itself.
+SPARE_TOGETHER = 3
 # The lowest there is: who waits for a message gets the processor at once.
 SPARE_PRIORITY = 19
 # Rostests that measure processor time; all others wait for what must come, however late.
@@ -84,11 +84,11 @@ def steps() -> List[Step]:
         _pytest("unit tests", "test/unit", "-m", "not long", *IN_PARALLEL),
         _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
         *oldest_versions(),
-        _pytest("recordings", "test/recordings", load=Load.SPARE),
-        _pytest("long tests", "test/unit", "-m", "long", load=Load.SPARE),
-        _damaged_files(),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
+        _pytest("long tests", "test/unit", "-m", "long", load=Load.SPARE),
+        _pytest("recordings", "test/recordings", load=Load.SPARE),
         _pytest("documentation", "test/documentation", load=Load.SPARE),
+        _damaged_files(),
         Step("catkin_lint", ["catkin_lint", "--strict", "-W1", "--offline", "."], load=Load.SPARE),
         _pytest("master restart", "test/stopping/test_master_restart.py", load=Load.SHARED),
         _pytest("web page", "test/stopping/test_web_page.py", load=Load.SHARED),
