@@ -15,6 +15,7 @@ from typing import Any, Dict, Iterator, List, Tuple
 from urllib.request import urlopen
 
 import numpy as np
+from soaking.processes import held_below
 from tornado.websocket import websocket_connect
 
 from benchmarks.harness import Row, benchmark_parser, print_table, say
@@ -176,25 +177,8 @@ class Figures:
 
 def _processor_seconds() -> Dict[str, float]:
     """Return the CPU seconds of our nodes so far, by name."""
-    import rosnode
-
-    pids = {node: _pid(node) for node in ("mapping", "web_page") if f"/{node}" in rosnode.get_node_names()}
-    ticks = os.sysconf("SC_CLK_TCK")
-    found = {}
-    for node, pid in pids.items():
-        with open(f"/proc/{pid}/stat") as file:
-            fields = file.read().rpartition(")")[2].split()
-        found[node] = (int(fields[11]) + int(fields[12])) / ticks
-    return found
-
-
-def _pid(node: str) -> int:
-    from xmlrpc.client import ServerProxy
-
-    import rosgraph
-
-    uri = rosgraph.Master("/bench").lookupNode(f"/{node}")
-    return ServerProxy(uri).getPid("/bench")[2]
+    found = held_below(os.getpid())
+    return {node: found[node].cpu for node in ("mapping", "web_page") if node in found}
 
 
 def main() -> None:
