@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any, Dict, List
+from typing import Any, Callable, Dict, List, Optional
 
 import numpy as np
 import rosgraph
@@ -191,6 +191,18 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"demo: done; map.mlsm, map.png and summary.json are in {output}")
 
 
+def status_of(name: str, work: Callable[[], Optional[int]]) -> int:
+    """Return the exit status of what a program does; what ends it is said in one line."""
+    try:
+        return work() or 0
+    except DemoError as error:
+        print(f"{name}: {error}", file=sys.stderr)
+        return 1
+    except KeyboardInterrupt:
+        print(f"{name}: stopped", file=sys.stderr)
+        return 130
+
+
 def main() -> int:
     """Parse the command line and run; return the exit status."""
     parser = argparse.ArgumentParser(prog="scripts/demo", description=__doc__)
@@ -198,15 +210,8 @@ def main() -> int:
     parser.add_argument("--factor", type=float, default=10.0, help="times real time")
     parser.add_argument("--no-rviz", action="store_true", help="no window, even with a screen")
     signal.signal(signal.SIGTERM, lambda *_: sys.exit(143))
-    try:
-        run(parser.parse_args())
-    except DemoError as error:
-        print(f"demo: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("demo: stopped", file=sys.stderr)
-        return 130
-    return 0
+    options = parser.parse_args()
+    return status_of("demo", lambda: run(options))
 
 
 if __name__ == "__main__":

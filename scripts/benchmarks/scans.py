@@ -63,6 +63,17 @@ def still(pose: np.ndarray) -> Poses:
     return lambda times: np.tile(np.asarray(pose, dtype=np.float64), (len(times), 1))
 
 
+def head_turn(number: int) -> Tuple[np.ndarray, np.ndarray]:
+    """Return times and head angles (b,) of the beams of turn number `number`."""
+    beams = range(number * HEAD.beams_per_turn, (number + 1) * HEAD.beams_per_turn)
+    return np.array([HEAD.time(beam) for beam in beams]), np.array([HEAD.angle(beam) for beam in beams])
+
+
+def at_depth(poses: np.ndarray) -> np.ndarray:
+    """Return planar poses (n, 3) as matrices (n, 4, 4) at the vehicle's depth."""
+    return np.array([pose_matrix((x, y, DEPTH), (0.0, 0.0, yaw)) for x, y, yaw in poses])
+
+
 class ScanMaker:
     """Makes scans in one world with one sonar; the same seed makes the same scan."""
 
@@ -79,9 +90,7 @@ class ScanMaker:
         track: Optional[Track] = None,
     ) -> Scan:  # fmt: skip
         """Return the scan of head turn number `turn`, its points placed by the odometry."""
-        numbers = turn * HEAD.beams_per_turn + np.arange(HEAD.beams_per_turn)
-        times = np.array([HEAD.time(int(number)) for number in numbers])
-        angles = np.array([HEAD.angle(int(number)) for number in numbers])
+        times, angles = head_turn(turn)
         beams, ranges, heights = self._echoes(true_pose(times), angles, seed)
         poses = odometry(times)
         arms = ranges[:, np.newaxis] * np.column_stack([np.cos(angles[beams]), np.sin(angles[beams])])
@@ -98,8 +107,7 @@ class ScanMaker:
     def _echoes(self, poses: np.ndarray, angles: np.ndarray, seed: int) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Return beam number, range [m] and height of the echoes heard from `poses` (b, 3) at head `angles` (b,)."""
         sonar = self.sonar(seed)
-        matrices = np.array([pose_matrix((x, y, DEPTH), (0.0, 0.0, yaw)) for x, y, yaw in poses])
-        echoes, _ = extract_echoes(sonar.pings(matrices, angles), sonar.range_resolution, self._extraction)
+        echoes, _ = extract_echoes(sonar.pings(at_depth(poses), angles), sonar.range_resolution, self._extraction)
         return echoes.beams, (echoes.bins + 0.5) * sonar.range_resolution, echoes.heights
 
 

@@ -14,7 +14,7 @@ from typing import List
 import rospy
 import yaml
 from benchmarks.harness import print_table
-from run_demo import ROOT, DemoError, Graph
+from run_demo import ROOT, DemoError, Graph, status_of
 
 from soaking.listening import Listener
 from soaking.processes import held_below
@@ -118,13 +118,7 @@ def main() -> int:
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     (folder / "maps").mkdir(parents=True, exist_ok=True)
     try:
-        return int(not soak(options, folder.resolve()))
-    except DemoError as error:
-        print(f"soak: {error}", file=sys.stderr)
-        return 1
-    except KeyboardInterrupt:
-        print("soak: stopped", file=sys.stderr)
-        return 130
+        return status_of("soak", lambda: int(not soak(options, folder.resolve())))
     finally:
         if options.output is None:
             shutil.rmtree(str(folder), ignore_errors=True)

@@ -2,15 +2,13 @@
 
 from typing import List, Optional
 
-import numpy as np
-from benchmarks.scans import DEPTH, HEAD, Poses, ScanMaker, SonarKind
+from benchmarks.scans import Poses, ScanMaker, SonarKind, at_depth, head_turn
 
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters, replay_values
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import pose_matrix
 from sonar_processing.beams.beam import Beam, PlacedBeam
 
 CHAIN = ThesisChain.from_values(thesis_values({}))
@@ -18,10 +16,6 @@ DEFAULTS = ThesisChain.from_values({})
 """The same chain with the defaults of the package."""
 PARAMETERS = ReplayParameters.from_mapping(replay_values(thesis_values({}))[0])
 _LATER = 1000.0  # s: stamps of messages are above 0
-
-
-def _matrix(pose: np.ndarray) -> np.ndarray:
-    return pose_matrix((pose[0], pose[1], DEPTH), (0.0, 0.0, pose[2]))
 
 
 class ThesisScans(ScanMaker):
@@ -35,15 +29,14 @@ class ThesisScans(ScanMaker):
         track: Optional[Track] = None,
     ) -> Scan:  # fmt: skip
         """Return the scan of head turn number `turn`, its points placed by the odometry."""
-        numbers = turn * HEAD.beams_per_turn + np.arange(HEAD.beams_per_turn)
-        times, angles = (np.array([one(int(number)) for number in numbers]) for one in (HEAD.time, HEAD.angle))
+        times, angles = head_turn(turn)
         sonar = self.sonar(seed)
-        strengths = sonar.pings(np.array([_matrix(pose) for pose in true_pose(times)]), angles)
+        strengths = sonar.pings(at_depth(true_pose(times)), angles)
         beams: List[PlacedBeam] = []
-        for time, angle, heard, pose in zip(times, angles, strengths, odometry(times)):
+        for time, angle, heard, place in zip(times, angles, strengths, at_depth(odometry(times))):
             stamp = round(1e9 * (time + _LATER))
             beam = Beam(stamp, "sonar", float(angle), heard, sonar.range_resolution, bin_place=CHAIN.clouds.bin_place)
-            beams.append(PlacedBeam(beam, _matrix(pose), moving))
+            beams.append(PlacedBeam(beam, place, moving))
         known = Track(times, odometry(times)) if track is None else track
         later = Track(known.times + _LATER, known.poses)
         made, _ = next(CHAIN.scans(Recording(beams, 0, later, None)))
