@@ -56,7 +56,7 @@ class LiveCauses:
         with self._lock:
             if not self._is_new or len(self._scans) < _FEWEST:
                 return
-            self._is_new, scans, places = 0, list(self._scans), self._places
+            self._is_new, scans, places = False, list(self._scans), self._places
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
         track = _track(scans)
         of_echoes = echo_findings(scans, self.sonar_in_base, corrections).causes
