@@ -219,7 +219,7 @@ class _Batch:
     def _met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         parameters = self._parameters
-        rows = self._run.log.rows(0, self._layout.last)
+        rows = self._run.log.surfaces.rows(0, self._layout.last)
         _, (points,) = across_weak([self._run.placed(rows)], parameters)
         if self._lists is None:
             self._lists = Neighbours(points, parameters.group_scans)

@@ -205,7 +205,7 @@ class LiveSolver:
         state = self.state
         for node in range(len(state.nodes), self.log.scan_count + 1):
             motion = self.log.node_motion(np.array([node - 1, node]))
-            newest = self.odometry.advanced(state.nodes[-1:], motion[:1], motion[1:])
+            newest = self.odometry.advanced(state.nodes[-1:], motion)
             state.nodes = np.append(state.nodes, newest, axis=0)
         self.search = None
         if fix is None:

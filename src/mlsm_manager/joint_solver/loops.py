@@ -54,7 +54,7 @@ def loops_of(solution: Solution) -> List[Loop]:
     log, parameters = solution.log, solution.parameters
     if parameters.parts_per_turn > 1:
         return []
-    points = solution.placed(log.rows(0, log.scan_count))
+    points = solution.placed(log.surfaces.rows(0, log.scan_count))
     found = [_loop(points, scan, parameters) for scan in range(APART, log.scan_count)]
     return agreed([loop for loop in found if loop is not None])
 
@@ -126,7 +126,7 @@ def with_newest(solution: Solution, before: Sequence[Loop]) -> Tuple[Loop, ...]:
     """Return the loops found `before` that the newest scan may confirm, and its own where it has one."""
     scan, parameters = solution.log.scan_count - 1, solution.parameters
     kept = tuple(loop for loop in before if loop.scan >= scan - NEIGHBOURS)
-    own = solution.log.rows(scan, scan + 1)
+    own = solution.log.surfaces.rows(scan, scan + 1)
     in_turn = scan % _EVERY == 0 or len(kept) > 0
     if not in_turn or scan < APART or len(own) < FEWEST_POINTS:
         return kept
@@ -146,7 +146,7 @@ def confirmed(loops: Sequence[Loop], scan: int) -> List[Loop]:
 def _landmarks(solution: Solution, middle: np.ndarray, radius: float) -> np.ndarray:
     """Return older scans (n,), ascending, whose ends lie within `radius` [m] of `middle` (2,) and apart."""
     last = solution.log.scan_count - APART
-    scans = np.flatnonzero((solution.submaps.numbers[:last] == MAP) & (solution.log.point_counts[:last] > 0))
+    scans = np.flatnonzero((solution.submaps.numbers[:last] == MAP) & (solution.log.surfaces.counts[:last] > 0))
     places = solution.node_places(scans + 1)
     distances = np.hypot(*(places - middle).T)
     left, chosen = np.flatnonzero(distances < radius), []

@@ -150,8 +150,8 @@ def agreement(met: Sequence[Comparison], scan: int, parameters: SolverParameters
 
 def _share(solution: Solution, turn: int) -> float:
     log, parts = solution.log, solution.parameters.parts_per_turn
-    before = log.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
-    own = log.rows(parts * turn, parts * (turn + 1))
+    before = log.surfaces.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
+    own = log.surfaces.rows(parts * turn, parts * (turn + 1))
     if not len(before) or not len(own):
         return np.nan
     sources, surfaces = solution.placed(own), Surfaces(solution.placed(before), solution.parameters)

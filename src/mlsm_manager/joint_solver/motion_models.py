@@ -74,8 +74,8 @@ class OdometryModel(Protocol):
     def first_deviations(self) -> np.ndarray:
         """Return their standard deviations (width,)."""
 
-    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        """Return the unknowns (n, width) expected at `after` (n), given those at `before` (n)."""
+    def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
+        """Return the unknowns (n, width) expected one step of `motion` (n + 1) after each of `nodes` (n, width)."""
 
     def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         """Add what ties n `nodes` (n, width) together; starts: (n - 1,) columns of all but the last. motion: (n)."""

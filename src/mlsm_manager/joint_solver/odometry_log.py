@@ -101,13 +101,6 @@ class Motion:
     def __post_init__(self) -> None:
         object.__setattr__(self, "positions", as_complex(self.poses))
 
-    def __len__(self) -> int:
-        return len(self.times)
-
-    def __getitem__(self, rows: Union[slice, np.ndarray]) -> "Motion":
-        """Return the motion at `rows`: a slice or an array of indices."""
-        return Motion(self.times[rows], self.poses[rows], self.ahead[rows], self.held[rows])
-
 
 class OdometryLog:
     """Poses T_odom_base of a run in the order of time; grows at its end, and yaw never jumps by a turn."""

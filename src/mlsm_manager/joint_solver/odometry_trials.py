@@ -64,7 +64,7 @@ def reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float
     first, last = np.searchsorted(log.node_times, stretch)
     for node in range(max(first, 1), min(last + 1, len(nodes))):
         motion = log.node_motion(np.array([node - 1, node]))
-        result[node, :YAW] = run.odometry.advanced(result[node - 1 : node], motion[:1], motion[1:])[0, :YAW]
+        result[node, :YAW] = run.odometry.advanced(result[node - 1 : node], motion)[0, :YAW]
         result[node + 1 :, :YAW] = nodes[node + 1 :, :YAW] + result[node, :YAW] - nodes[node, :YAW]
     return result
 

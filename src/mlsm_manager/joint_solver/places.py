@@ -169,7 +169,10 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     step = Transition.of(solution.odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
     if _KNOWN * widest(step[:2, :2]) < solution.parameters.cut:
         return newest
-    before, own = log.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1), log.rows(last - 1, last)
+    before, own = (
+        log.surfaces.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1),
+        log.surfaces.rows(last - 1, last),
+    )
     if not len(before) or not len(own):
         return newest
     search = _Search(solution, Surfaces(solution.placed(before), solution.parameters), own)
@@ -191,7 +194,7 @@ def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int)
     """
     log, parameters = solution.log, solution.parameters
     last = log.scan_count
-    own, place = log.rows(last - 1, last), _covariance_since(solution, covariance, silent)[:2, :2]
+    own, place = log.surfaces.rows(last - 1, last), _covariance_since(solution, covariance, silent)[:2, :2]
     if widest(place) * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
         return None
     return _best_place(solution, own[:: max(1, len(own) // MOST_POINTS)], place)
@@ -204,7 +207,7 @@ def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
     """
     log = solution.log
     last, first = log.scan_count, solution.submaps.start
-    rows = log.rows(max(first, last - _SUBMAP_SCANS), last)
+    rows = log.surfaces.rows(max(first, last - _SUBMAP_SCANS), last)
     found = _best_place(solution, rows[:: max(1, len(rows) // _SUBMAP_POINTS)], covariance)
     if found.is_certain:
         solution.move_newest(_shares_of_move(log, first), found.shift)
@@ -292,7 +295,7 @@ def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -
 
 def _silent_before(log: RunLog, scan: int) -> int:
     """Return how many scans before `scan` heard too little to tell a place, one after the other."""
-    heard = np.flatnonzero(log.point_counts[:scan] >= FEWEST_POINTS)
+    heard = np.flatnonzero(log.surfaces.counts[:scan] >= FEWEST_POINTS)
     return scan - 1 - int(heard[-1]) if len(heard) else scan
 
 

@@ -98,8 +98,8 @@ class DvlFactors(OdometryModel):
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         return (1.0 + nodes[..., SCALE]) * np.exp(1j * nodes[..., DIRECTION])
 
-    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        step = after.positions - before.positions
+    def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
+        step = np.diff(motion.positions)
         error = stretched(step, self.gain(nodes), nodes[:, YAW]) - step
         result = nodes.copy()
         result[:, 0] += error.real
@@ -166,9 +166,9 @@ class ThrusterFactors(DvlFactors):
         current = max(self._own.current_deviation, HELD_DEVIATION)
         return np.append(super().first_deviations(), [current, current])
 
-    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        result = super().advanced(nodes, before, after)
-        result[:, :2] += nodes[:, _CURRENT] * (after.times - before.times)[:, np.newaxis]
+    def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
+        result = super().advanced(nodes, motion)
+        result[:, :2] += nodes[:, _CURRENT] * np.diff(motion.times)[:, np.newaxis]
         return result
 
     def drift(self, node: np.ndarray, heading: float) -> Drift:

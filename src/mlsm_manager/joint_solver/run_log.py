@@ -81,8 +81,8 @@ class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
     sonar_in_base: (2,) m. surfaces: points on surfaces. posts: echoes of what is small. Points of scans may be
-    forgotten; the nodes stay. scan_count: so far. node_times: (scan_count + 1,) s, a view that the next scan makes
-    invalid; empty before the first scan.
+    forgotten; the nodes stay. scan_count: so far. node_times: (scan_count + 1,) s; empty before the first scan.
+    forgotten: (scan_count,) bool, whose points are. The next scan makes both views invalid.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -90,21 +90,11 @@ class RunLog:
         self.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         self.odometry = OdometryLog()
         self._node_times = GrowingArray()
-        self.scan_count, self.node_times = 0, self._node_times.values
         self.surfaces, self.posts = PointTable(), PointTable()
         self._odometry_lengths: List[int] = []
         self._forgotten = GrowingArray(kind=bool)
         self._points_and_echoes = GrowingArray(2)
-
-    @property
-    def forgotten(self) -> np.ndarray:
-        """(scan_count,) bool, scans whose points are forgotten; a view."""
-        return self._forgotten.values
-
-    @property
-    def point_counts(self) -> np.ndarray:
-        """(scan_count,) int, number of points on surfaces of each scan."""
-        return self.surfaces.counts
+        self._count()
 
     @property
     def has_plateaus(self) -> bool:
@@ -148,7 +138,8 @@ class RunLog:
 
     def _count(self) -> None:
         """Learn how many scans there are now."""
-        self.scan_count, self.node_times = self.surfaces.scan_count, self._node_times.values
+        self.scan_count = self.surfaces.scan_count
+        self.node_times, self.forgotten = self._node_times.values, self._forgotten.values
 
     def shorten(self, scans: int) -> None:
         """Keep the oldest `scans`, as if the others had not been."""
@@ -195,10 +186,6 @@ class RunLog:
         other.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         other.surfaces, other.posts = self.surfaces.since(0, change), self.posts.since(0, change)
         return other
-
-    def rows(self, first: int, last: int) -> np.ndarray:
-        """Return the rows (n,) of the points of scans `first` to `last` - 1, oldest scan first."""
-        return self.surfaces.rows(first, last)
 
     def node_motion(self, nodes: np.ndarray) -> Motion:
         """Return what the odometry reported up to `nodes` (n,)."""

@@ -96,14 +96,14 @@ class HeadingFactors(OdometryModel):
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         return nodes[..., AHEAD] + 1j * nodes[..., ASIDE]
 
-    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        result, durations = nodes.copy(), after.times - before.times
+    def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
+        result, durations = nodes.copy(), np.diff(motion.times)
         kept, slipping = self._kept(durations)
         result[:, AHEAD] = nodes[:, TRAVEL] + kept * (nodes[:, AHEAD] - nodes[:, TRAVEL])
         result[:, ASIDE] = slipping * nodes[:, ASIDE]
         mean = (self.gain(nodes) + self.gain(result)) / 2.0
-        step = stretched(self.reference(after) - self.reference(before), mean, nodes[:, YAW])
-        error = step - (after.positions - before.positions)
+        step = stretched(np.diff(self.reference(motion)), mean, nodes[:, YAW])
+        error = step - np.diff(motion.positions)
         result[:, 0] += error.real
         result[:, 1] += error.imag
         return result
@@ -195,14 +195,14 @@ class UnaidedFactors(HeadingFactors):
         """The first heading defines the map."""
         return np.append(super().first_deviations(), self._own.turn_rate_deviation)
 
-    def advanced(self, nodes: np.ndarray, before: Motion, after: Motion) -> np.ndarray:
-        durations = after.times - before.times
+    def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
+        durations = np.diff(motion.times)
         rate = nodes[:, TURN_RATE]
         half = nodes.copy()
         later = np.exp(-durations / self._own.turn_rate_correlation_time) * rate
         turn = (rate + later) / 2.0 * durations
         half[:, YAW] += turn / 2.0
-        result = super().advanced(half, before, after)
+        result = super().advanced(half, motion)
         result[:, YAW] += turn / 2.0
         result[:, TURN_RATE] = later
         return result

@@ -125,7 +125,7 @@ class JointSession:
         newest = slice(-_CHECKED_SCANS * parts, None)
         estimates, apart = self.solver.estimates, self.solver.submaps.apart
         turns = Turns.of(estimates[newest], apart[newest], parts)
-        heard = Turns.with_echoes(estimates, apart, parts, self.solver.log.point_counts, _CHECKED_SCANS)
+        heard = Turns.with_echoes(estimates, apart, parts, self.solver.log.surfaces.counts, _CHECKED_SCANS)
         begin = self.start if len(turns.times) else np.nan
         return [
             *self._going_on(turns.times),

@@ -35,6 +35,7 @@ class KeyframeCarving:
     """The free space of a KeyframeMap, and which of its blocks must go because beams go through them.
 
     Keyframes that are settled carve for ever, in the order of time. What the others say is kept beside the map.
+    settled: what these know to be free.
     """
 
     def __init__(self, resolution: float, limit: float, carver: Optional[Carver], most_followed: int) -> None:
@@ -43,7 +44,7 @@ class KeyframeCarving:
         """
         self._carver = carver
         self._most_followed = most_followed
-        self._free = MultiLevelSurfaceMap(resolution, limit)
+        self.settled = MultiLevelSurfaceMap(resolution, limit)
         self._looks: Deque[Optional[_Look]] = deque()
         self._hit_cells, self._hit_by = np.empty(0, dtype=np.int64), np.empty(0, dtype=np.int64)
 
@@ -54,22 +55,17 @@ class KeyframeCarving:
 
     def begin_copy(self) -> RunningCopy:
         """Return a copy of what is known to be free now, which is still to be made."""
-        overlay = Overlay(self._free)
+        overlay = Overlay(self.settled)
         for look in self._looks:
             if look is not None:
                 overlay.lay(look.findings.free)
-        copy = self._free.begin_copy()
+        copy = self.settled.begin_copy()
         overlay.take_off()
         return copy
 
     def restore(self, free: Blocks) -> None:
         """Take what was known to be free. Raises ValueError for another resolution."""
-        self._free.insert_blocks(free)
-
-    @property
-    def settled(self) -> MultiLevelSurfaceMap:
-        """What settled keyframes know to be free."""
-        return self._free
+        self.settled.insert_blocks(free)
 
     @property
     def follows(self) -> bool:
@@ -85,7 +81,7 @@ class KeyframeCarving:
         """
         if self._carver is None:
             return None, None
-        return self._carver.carve(surface_map, self._free, FirstEchoes.of_level(points, times, origins), points)
+        return self._carver.carve(surface_map, self.settled, FirstEchoes.of_level(points, times, origins), points)
 
     def forget_oldest(self) -> None:
         """Forget what the oldest keyframe said, because it is settled."""

@@ -40,7 +40,10 @@ class FoundPlace:
 
 
 class PlaceSearch:
-    """Decides, scan by scan after a map was loaded, whether the place is known, expected or lost."""
+    """Decides, scan by scan after a map was loaded, whether the place is known, expected or lost.
+
+    may_be_near: whether the vehicle may still be where it is expected, also when the whole map is searched.
+    """
 
     def __init__(self) -> None:
         self.forget()
@@ -48,13 +51,13 @@ class PlaceSearch:
     def forget(self) -> None:
         """Take the place as known."""
         self._left: Optional[int] = None
-        self._is_expected = False
+        self.may_be_near = False
         self._found: Optional[FoundPlace] = None
 
     def expect(self) -> None:
         """Take the place as near to where it is expected."""
         self._left = _MOST_REJECTED
-        self._is_expected = True
+        self.may_be_near = True
 
     def lose(self) -> None:
         """Take the place as anywhere in the map."""
@@ -70,11 +73,6 @@ class PlaceSearch:
     def is_lost(self) -> bool:
         """Whether the whole map must be searched."""
         return self._left == 0
-
-    @property
-    def may_be_near(self) -> bool:
-        """Whether the vehicle may still be where it is expected, also when the whole map is searched."""
-        return self._is_expected
 
     def learn(self, accepted: bool) -> None:
         """Learn whether a scan was matched."""

@@ -176,7 +176,7 @@ def _trust(
     solver = replayed.solver
     parts, apart = solver.parameters.parts_per_turn, solver.submaps.apart
     turns = Turns.of(solver.estimates, apart, parts)
-    heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.point_counts, solver.log.scan_count)
+    heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.surfaces.counts, solver.log.scan_count)
     if refined is None:
         path, solution, times = replayed.corrected, solver.solution, np.array([one.time for one in solver.estimates])
         covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])

@@ -197,13 +197,13 @@ class MovingState:
     """The newest velocity, and how long ago it came in the time of the beams.
 
     Velocities have no stamp of their own (Twist), so a beam takes the newest one that came before it. A velocity that
-    is not followed by another stays valid: a command may be sent once.
+    is not followed by another stays valid: a command may be sent once. was_heard: whether any has come.
     """
 
     def __init__(self) -> None:
         self._speed = 0.0
         self._turn_rate = 0.0
-        self._heard = False
+        self.was_heard = False
         self._since_ns: Optional[int] = None
 
     def take(self, linear: Sequence[float], angular: Sequence[float]) -> None:
@@ -212,12 +212,7 @@ class MovingState:
         if not (math.isfinite(speed) and math.isfinite(turn_rate)):
             raise RefusedInput("velocities refused", f"{tuple(linear)} m/s, {tuple(angular)} rad/s, must be finite")
         self._speed, self._turn_rate = speed, turn_rate
-        self._heard, self._since_ns = True, None
-
-    @property
-    def was_heard(self) -> bool:
-        """Whether any velocity has been received."""
-        return self._heard
+        self.was_heard, self._since_ns = True, None
 
     def is_moving(self, parameters: SonarToCloudParameters) -> bool:
         """Whether the vehicle is faster than the dead band; without any velocity it is still."""

@@ -76,7 +76,7 @@ def test_a_vehicle_is_found_in_its_own_map(harbour):
 
 def test_scans_that_heard_nothing_do_not_count_as_beside_the_map(harbour):
     solver = harbour[0].solver
-    turns = Turns.with_echoes(solver.estimates, solver.submaps.apart, 1, solver.log.point_counts, 10)
+    turns = Turns.with_echoes(solver.estimates, solver.submaps.apart, 1, solver.log.surfaces.counts, 10)
     assert len(turns.times) == 10
     assert turns.times[0] < BEGIN * TURN < END * TURN - TURN < turns.times[-1]
     assert turns.agreements.min() > 0.9
@@ -85,7 +85,7 @@ def test_scans_that_heard_nothing_do_not_count_as_beside_the_map(harbour):
 def test_a_turn_counts_as_heard_where_one_of_its_parts_was(canal):
     """Of eight turns of three parts, in two no part heard anything."""
     solver = canal[0].solver
-    turns = Turns.with_echoes(solver.estimates, solver.submaps.apart, 3, solver.log.point_counts, END)
+    turns = Turns.with_echoes(solver.estimates, solver.submaps.apart, 3, solver.log.surfaces.counts, END)
     assert len(turns.times) == END // 3 - 2
 
 

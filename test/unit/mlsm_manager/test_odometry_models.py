@@ -44,6 +44,11 @@ def some_nodes(model, seed=2):
     return nodes
 
 
+def step_of_motion(node):
+    rows = slice(node, node + 2)
+    return Motion(TIMES[rows], POSES[rows], MOTION.ahead[rows], MOTION.held[rows])
+
+
 def equations_of(model, nodes):
     layout = Layout(0, 2, model.width)
     equations = NormalEquations(layout.size)
@@ -57,7 +62,7 @@ def test_a_motion_that_went_as_expected_pulls_at_nothing(kind):
     nodes = [np.random.RandomState(4).normal(0.0, 0.1, model.width)]
     nodes[0][2] = 0.0  # a compass error is expected to fade
     for node in range(2):
-        nodes.append(model.advanced(nodes[-1][np.newaxis], MOTION[node : node + 1], MOTION[node + 1 : node + 2])[0])
+        nodes.append(model.advanced(nodes[-1][np.newaxis], step_of_motion(node))[0])
     np.testing.assert_allclose(equations_of(model, np.array(nodes)).gradient, 0.0, atol=2e-2)
 
 
@@ -65,7 +70,7 @@ def test_a_motion_that_went_as_expected_pulls_at_nothing(kind):
 def test_rates_go_on_live_as_the_nodes_are_expected_to(kind):
     model = model_of(kind)
     node, fading = some_nodes(model)[0], model.fading(some_nodes(model)[0])
-    later = model.advanced(node[np.newaxis], MOTION[:1], MOTION[1:2])[0]
+    later = model.advanced(node[np.newaxis], step_of_motion(0))[0]
     now, then = (model.drift(one, 0.3).values[:3] for one in (node, later))
     expected = now if fading is None else fading.after(now, TIMES[1] - TIMES[0])
     np.testing.assert_allclose(then, expected, atol=1e-12)
