@@ -18,8 +18,8 @@ from ping360_driver.scan_command import beam as head_beam
 from ping360_driver.scan_command import bin_length
 from ping360_driver.scan_command import head_angle as ping360_angle
 from recordings.bags.bag import RecordingError
-from recordings.beam_table import beams_of_table, is_beam_table
 from recordings.beams import RecordedBeams
+from recordings.motion.motion_table import is_table, rows_of
 from recordings.motion.pose_track import PoseTrack
 from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_fixes, vehicle_headings
 from sonar_processing.beams.beam import Beam
@@ -63,8 +63,8 @@ def _reader(path: Path) -> Optional[_Reader]:
         return _imagenex_beams
     if is_ping_viewer_next(path):
         return _ping_viewer_next_beams
-    if is_beam_table(path):
-        return beams_of_table
+    if _is_beam_table(path):
+        return _beams_of_table
     return _ping_viewer_beams if path.is_file() and _is_ping_viewer_log(path) else None
 
 
@@ -174,3 +174,40 @@ def _beam_of(found: HeadBeam, time: float) -> Beam:
     check_stamp(stamp)
     resolution = bin_length(found.pulse.sample_period, USUAL_SPEED_OF_SOUND)
     return Beam(stamp, _FRAME, ping360_angle(found.angle), np.frombuffer(found.echoes, dtype=np.uint8), resolution)
+
+
+_ANGLES = {"angle": 1.0, "angle_deg": np.pi / 180.0}  # rad
+
+
+def _is_beam_table(path: Path) -> bool:
+    """Return whether a file is a table with a column of bins."""
+    if not is_table(path):
+        return False
+    try:
+        return "bins" in next(rows_of(path), [])
+    except RecordingError:
+        return False
+
+
+def _beams_of_table(path: Path) -> RecordedBeams:
+    """Return the beams of a table as docs/sonars.md describes it. Raises RecordingError for one without a column."""
+    names, *rows = rows_of(path)
+    angle = next((name for name in _ANGLES if name in names), "angle")
+    missing = [name for name in ("time", angle, "range") if name not in names]
+    if missing or names[-1] != "bins":
+        raise RecordingError(f"{path}: has the columns {', '.join(names)}; needs time, angle, range and, last, bins")
+    beams, refused, reason = [], 0, ""
+    for line, row in enumerate(rows, start=2):
+        try:
+            beams.append(_beam_of_row(dict(zip(names, row)), angle, row[len(names) - 1 :]))
+        except (RefusedInput, ValueError, KeyError, OverflowError) as error:
+            refused, reason = refused + 1, reason or f"line {line}: {error}"
+    notes = [f"{refused} rows of {path.name} hold no beam, the first is {reason}"] if refused else []
+    return RecordedBeams(beams, [False] * len(beams), refused, notes)
+
+
+def _beam_of_row(cells: Dict[str, str], angle: str, bins: List[str]) -> Beam:
+    """Return the beam of a row. Raises RefusedInput, ValueError and KeyError for a row that holds none."""
+    strengths = np.clip([float(value) for value in " ".join(bins).split()], 0, 255).astype(np.uint8)
+    length = float(cells["range"]) / max(strengths.size, 1)
+    return Beam(round(float(cells["time"]) * 1e9), _FRAME, float(cells[angle]) * _ANGLES[angle], strengths, length)

@@ -4,7 +4,7 @@ import math
 import os
 import time
 from dataclasses import dataclass
-from typing import Callable, Dict, Optional, Sequence
+from typing import Callable, Dict, List, Optional, Sequence
 
 import numpy as np
 
@@ -13,15 +13,19 @@ from node_support.geometry import wrapped
 from node_support.marks import Mark
 from sonar_processing.beams.beam import Beam
 from web_page.board import BEAM, NOW, TILE, TRACK, WORDS, Board
-from web_page.history import History
-from web_page.messages import Kind, text_of
+from web_page.messages import Kind, Ray, beam_bytes, rows_bytes, text_of
 from web_page.parameters import WebPageParameters
-from web_page.sonar import SonarDisc
 from web_page.tiles import BORN_STEP, SIDE, MapTiles
 
 JUMP_BACK = 1.0  # s: messages overtake each other by less
 _SILENCE = 5.0  # s of wall time
 _TRACK_PERIOD = 1.0  # s between two positions of the trail
+_CHUNK = 32  # rows that are sent together: few, because the newest chunk goes again with each new row
+_MOST_ROWS = 2048  # rows; when they are there, every second one goes
+_BINS = 200  # of a beam: a pixel each where the picture is as wide as a hand
+_SLOTS = 400  # directions of the bow: as fine as the finest heads step
+_NARROWEST = 0.0436  # rad: width of a beam
+_WIDEST_STEP = 0.2  # rad: a wider step is a gap, as where a sector begins anew
 
 
 @dataclass(frozen=True)
@@ -154,3 +158,75 @@ class Scene:
         if missing or silence <= _SILENCE:
             return missing and f"waiting for {missing}"
         return f"mlsm_core has said nothing for {silence:.0f} s"
+
+
+class History:
+    """Keeps rows of numbers, each with its time [s] first, and shows them in chunks.
+
+    Memory is bounded: the older rows are, the fewer are left.
+    """
+
+    def __init__(self, kind: Kind, least: float, put: Callable[[int, bytes], None]) -> None:
+        """`least`: s between two rows. `put` takes the number of a chunk that changed, and its bytes."""
+        self._kind, self._first_least, self._put = kind, least, put
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget all."""
+        self._rows: List[Sequence[float]] = []
+        self._least = self._first_least
+
+    def __len__(self) -> int:
+        return len(self._rows)
+
+    def take(self, row: Sequence[float]) -> bool:
+        """Keep a row unless it follows the last one too soon; return whether it was kept."""
+        if self._rows and row[0] - self._rows[-1][0] < self._least:
+            return False
+        self._rows.append(row)
+        if len(self._rows) < _MOST_ROWS:
+            self._show((len(self._rows) - 1) // _CHUNK)
+            return True
+        before = self._chunks()
+        self._rows, self._least = self._rows[1::2], max(2.0 * self._least, 1e-3)
+        for chunk in range(before):
+            self._show(chunk)
+        return True
+
+    def _chunks(self) -> int:
+        return -(-len(self._rows) // _CHUNK)
+
+    def _show(self, chunk: int) -> None:
+        rows = np.array(self._rows[chunk * _CHUNK : (chunk + 1) * _CHUNK], dtype=np.float64)
+        self._put(chunk, rows_bytes(self._kind, chunk, rows.reshape(-1, len(self._rows[0]))))
+
+
+class SonarDisc:
+    """Makes each beam of the newest revolution ready to be drawn; the next one in its direction takes its place."""
+
+    def __init__(self, put: Callable[[int, bytes], None], clear: Callable[[List[int]], None]) -> None:
+        """`put` takes the number of a direction and the bytes of its beam, `clear` those of a revolution that ended."""
+        self._put, self._clear = put, clear
+        self._reach = 0.0
+        self._last: Optional[float] = None
+
+    def take(self, beam: Beam, T_base_sonar: np.ndarray, T_map_sonar: np.ndarray) -> None:
+        """Take a beam and where the sonar is (4, 4) on the vehicle and in the map."""
+        reach = beam.intensities.size * beam.range_resolution
+        if abs(reach - self._reach) > 0.01 * reach:
+            self._clear(list(range(_SLOTS)))
+        self._reach = reach
+        ahead = np.array([math.cos(beam.angle), math.sin(beam.angle), 0.0])
+        from_bow, in_map = (math.atan2(*(turn @ ahead)[1::-1]) for turn in (T_base_sonar[:3, :3], T_map_sonar[:3, :3]))
+        step = 0.0 if self._last is None else abs(wrapped(from_bow - self._last))
+        self._last = from_bow
+        width = max(_NARROWEST, step if step < _WIDEST_STEP else 0.0)
+        slot = round(from_bow / (2.0 * math.pi) * _SLOTS) % _SLOTS
+        ray = Ray(from_bow, in_map, width, *T_map_sonar[:2, 3])
+        self._put(slot, beam_bytes(reach, ray, pooled(beam.intensities)))
+
+
+def pooled(strengths: np.ndarray) -> np.ndarray:
+    """Return at most 200 strengths: of bins that share one, the strongest."""
+    starts = np.unique(np.arange(_BINS) * len(strengths) // _BINS)
+    return np.maximum.reduceat(strengths, starts)

@@ -8,9 +8,8 @@ from sensor_msgs.msg import NavSatFix, NavSatStatus
 from std_msgs.msg import Float64MultiArray
 
 from georeferencing.adjustment import Adjusted
-from georeferencing.asked import AskedOrigin
+from georeferencing.asked import AskedOrigin, LiveOrigin
 from georeferencing.fixes import fix_of
-from georeferencing.live import LiveOrigin
 from georeferencing.origin import Origin
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState

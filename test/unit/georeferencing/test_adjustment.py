@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 
 from georeferencing.adjustment import COMPASS_DEVIATION, adjusted, of_compass
-from georeferencing.asked import AskedOrigin
+from georeferencing.asked import AskedOrigin, LiveOrigin
 from georeferencing.fixes import UNKNOWN_DEVIATION, Fix, PlacedFixes, fix_of
-from georeferencing.live import LiveOrigin
 from georeferencing.origin import Origin
 from node_support.errors import RefusedInput
 from node_support.geometry import rotated

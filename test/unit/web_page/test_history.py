@@ -4,8 +4,8 @@ import struct
 
 import numpy as np
 
-from web_page.history import History
 from web_page.messages import Kind
+from web_page.scene import History
 
 
 def _rows(told):

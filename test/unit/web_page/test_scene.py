@@ -8,8 +8,7 @@ from node_support.thin_queue import ThinQueue
 from sonar_processing.beams.beam import Beam
 from web_page.board import Board
 from web_page.parameters import WebPageParameters
-from web_page.scene import Scene, Status
-from web_page.sonar import pooled
+from web_page.scene import Scene, Status, pooled
 from web_page.stages import Report, Stages
 
 
