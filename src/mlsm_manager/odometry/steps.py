@@ -219,8 +219,11 @@ class Stall(NamedTuple):
 
 
 def stalls(track: Track) -> List[Stall]:
-    """Return where the position stood for seconds, though no vehicle stops and starts so suddenly."""
-    same = stretches((np.diff(track.poses[:, :2], axis=0) == 0.0).all(axis=1))
+    """Return where the position stood for seconds, though no vehicle stops and starts so suddenly; without positions,
+    where the heading did.
+    """
+    moves = np.diff(track.poses, axis=0) != 0.0
+    same = stretches(~(moves[:, :2] if moves[:, :2].any() else moves[:, 2:]).any(axis=1))
     found = (_stall(track, first, last) for first, last in same if last + 1 < len(track.times))
     return [stall for stall in found if stall is not None]
 

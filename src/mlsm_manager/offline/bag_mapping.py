@@ -12,6 +12,7 @@ from tqdm import tqdm
 
 from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind, strafes
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
@@ -94,10 +95,6 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
     found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
-    if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, replayed, options):
-        reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
-        cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
-        return _mapped(recording, [*causes, cause], OdometryFound(OdometryKind.HEADING, reason), options)
     of_echoes = [*mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
     refined, refitted = None, []
@@ -106,6 +103,11 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
             settings = parameters.map_settings()
             suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
             refined = refine(replayed, recording.track, settings, suspected, bar.update)
+    believed = _believed(replayed, refined)
+    if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, believed, options):
+        reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
+        cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
+        return _mapped(recording, [*causes, cause], OdometryFound(OdometryKind.HEADING, reason), options)
     if options.check:
         with _bar(REFITS, "fit", "check") as bar:
             refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
@@ -142,8 +144,10 @@ def _followed(
     """
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
     replayed = _replayed(recording, scans, parameters)
-    asked = odometry.kind is OdometryKind.HEADING and not _is_named(options) and _may_strafe(replayed)
-    if not asked or goes_on_with_other_ranges(replayed.solver.solution, recording.track):
+    asked = odometry.kind is OdometryKind.HEADING and not _is_named(options) and replayed.solver is not None
+    if not asked or not may_strafe(replayed.solver.solution):
+        return odometry, parameters, replayed
+    if goes_on_with_other_ranges(replayed.solver.solution, recording.track):
         return odometry, parameters, replayed
     other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
     changed = with_odometry(extracting, other.kind, options.fixed)
@@ -155,18 +159,24 @@ def _followed(
 
 def _positions_mislead(
     recording: Recording, scans: List[Scan], extracting: ReplayParameters, odometry: OdometryFound,
-    believed: Replayed, options: Namespace,
+    believed: Optional[Solution], options: Namespace,
 ) -> bool:  # fmt: skip
     """Return whether scans go on clearly better without reported positions, where nobody named the odometry."""
-    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and _may_strafe(believed)
-    if not asked:
+    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and believed is not None
+    if not asked or not may_strafe(believed):
         return False
     alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
-    return goes_on_better(believed.solver.solution, alone.solver.solution)
+    return goes_on_better(believed, alone.solver.solution)
 
 
-def _may_strafe(replayed: Replayed) -> bool:
-    return replayed.solver is not None and may_strafe(replayed.solver.solution)
+def _believed(replayed: Replayed, refined: Optional[Refined]) -> Optional[Solution]:
+    """Return the run in which scans are to go on: with what is wrong with its odometry taken out, if that is known.
+
+    Ranges that are made smaller let scans go on whatever is true.
+    """
+    if refined is not None and not any(isinstance(cause.fault, SonarFault) for cause in refined.motion.causes):
+        return refined.solution
+    return None if replayed.solver is None else replayed.solver.solution
 
 
 class _Heard(NamedTuple):

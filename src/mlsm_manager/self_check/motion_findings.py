@@ -1,14 +1,13 @@
 """What the echoes of a whole run say against its odometry and its sonar, and the run with that mended."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, NamedTuple, Sequence
+from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
-from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
@@ -42,6 +41,7 @@ _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances
 _GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
 _FAULTS = 3  # at most, one after the other
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
+_UNLIKELY_DELAY = 2.5
 _FEWEST = 15  # nodes: fewer do not tell a change from noise
 
 
@@ -80,15 +80,31 @@ class MotionFindings:
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
         turned = course_causes(course) or self._calibration_causes()
-        return replace(self, causes=[*self.causes, *turned], apart=[*self.apart, aside])
+        return replace(self, causes=[*self.causes, *turned], apart=[*self.apart, aside, self._late(places)])
+
+    def _late(self, places: np.ndarray) -> np.ndarray:
+        """Return how far nodes at `places` (n, 2) [m] lie beside where they are by the sonar's clock, (n, 2) m.
+
+        Zeros where both clocks agree as usual; where not, nothing tells which of them is right.
+        """
+        delay, deviation = self._delay
+        times = self.fit.node_times + (delay if abs(delay) > deviation else 0.0)
+        return np.stack([np.interp(times, self.fit.node_times, axis) for axis in places.T], axis=-1) - places
+
+    @property
+    def _delay(self) -> Tuple[float, float]:
+        """By how much beams are later than was known before the run, and the deviation of that [s]."""
+        (_, delay), (_, deviation) = self.run.state.run, self.run.parameters.run_deviations(self.run.log)
+        _, known = self.run.parameters.run_mean(self.run.log)
+        return float(delay - known), max(float(deviation), HELD_DEVIATION)
 
     def _calibration_causes(self) -> List[Cause]:
         """Return what is unlikely of the direction and the delay that the run found."""
-        (model, parameters), found = (self.run.odometry, self.run.parameters), []
-        delay = self.run.state.run[DELAY] - parameters.run_mean(self.run.log)[DELAY]
-        size = abs(delay) / max(parameters.run_deviations(self.run.log)[DELAY], HELD_DEVIATION)
-        if size > _UNLIKELY:
-            found.append(delay_cause(float(delay), 0.5 * float(size) ** 2))
+        model, found = self.run.odometry, []
+        delay, deviation = self._delay
+        size = abs(delay) / deviation
+        if size > _UNLIKELY_DELAY:
+            found.append(delay_cause(delay, 0.5 * size**2))
         if DIRECTION in model.calibrated.values():
             turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
             size = abs(turn) / float(model.first_deviations()[DIRECTION])
