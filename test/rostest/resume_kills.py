@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """A node that matches with the joint solver keeps its map and its place over kills with -9 at random moments."""
 
-import os
 import sys
 import unittest
 from collections import Counter
@@ -18,7 +17,7 @@ from resumed_vehicle import Fate, Kill, Mission, ResumedVehicle
 
 from mlsm_manager.scan_matching.scan import Track
 
-sys.path.append(os.path.join(str(PACKAGE_ROOT), "test", "unit", "mlsm_manager"))
+sys.path += [str(PACKAGE_ROOT / "test/unit"), str(PACKAGE_ROOT / "test/unit/mlsm_manager")]
 
 from made_harbour import SONAR_IN_BASE, tour
 

@@ -103,8 +103,8 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
             settings = parameters.map_settings()
             suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
             refined = refine(replayed, recording.track, settings, suspected, bar.update)
-    believed = _believed(replayed, refined)
-    if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, believed, options):
+    runs = _runs(replayed, refined)
+    if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, runs, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
         cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
         return _mapped(recording, [*causes, cause], OdometryFound(OdometryKind.HEADING, reason), options)
@@ -159,24 +159,28 @@ def _followed(
 
 def _positions_mislead(
     recording: Recording, scans: List[Scan], extracting: ReplayParameters, odometry: OdometryFound,
-    believed: Optional[Solution], options: Namespace,
+    believed: Sequence[Solution], options: Namespace,
 ) -> bool:  # fmt: skip
-    """Return whether scans go on clearly better without reported positions, where nobody named the odometry."""
-    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and believed is not None
-    if not asked or not may_strafe(believed):
+    """Return whether scans go on clearly better without reported positions than in all runs that believe these.
+
+    No where somebody named the odometry.
+    """
+    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and len(believed) > 0
+    if not asked or not all(map(may_strafe, believed)):
         return False
     alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
-    return goes_on_better(believed, alone.solver.solution)
+    return goes_on_better(believed[-1], alone.solver.solution)
 
 
-def _believed(replayed: Replayed, refined: Optional[Refined]) -> Optional[Solution]:
-    """Return the run in which scans are to go on: with what is wrong with its odometry taken out, if that is known.
+def _runs(replayed: Replayed, refined: Optional[Refined]) -> List[Solution]:
+    """Return the live run, and the one with what is wrong with its odometry taken out; none without a solver.
 
-    Ranges that are made smaller let scans go on whatever is true.
+    Ranges that are made smaller let scans go on whatever is true: a run with these is left out.
     """
+    runs = [] if replayed.solver is None else [replayed.solver.solution]
     if refined is not None and not any(isinstance(cause.fault, SonarFault) for cause in refined.motion.causes):
-        return refined.solution
-    return None if replayed.solver is None else replayed.solver.solution
+        runs.append(refined.solution)
+    return runs
 
 
 class _Heard(NamedTuple):
