@@ -75,6 +75,8 @@ class MotionFindings:
 
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount."""
+        if not _tells(self.track):
+            return self
         # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
         course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
         gone = places - places[0]
@@ -154,8 +156,7 @@ def motion_findings(
     show.
     """
     found = MotionFindings(run, fit, track)
-    tells = np.ptp(track.poses, axis=0).any()
-    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not tells:
+    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not _tells(track):
         return found
     first = places = _places(run)
     for _ in range(_FAULTS + 1):
@@ -174,6 +175,11 @@ def motion_findings(
         suspected = [fault for fault in suspected if fault.kind is not best.fault.kind]
     others = [places, first] if found.causes else [places] if _errs(errors) else []
     return replace(found, apart=[other - _places(found.run) for other in others])
+
+
+def _tells(track: Track) -> bool:
+    """Return whether an odometry says anything of the motion."""
+    return bool(np.ptp(track.poses, axis=0).any())
 
 
 def _places(run: Solution) -> np.ndarray:
