@@ -95,7 +95,9 @@ class Trust(unittest.TestCase):
         for number, shift in enumerate((HOUR, -HOUR), start=1):
             type(self).shift += shift
             type(self).seconds -= STEP
-            self.send_odometry()
+            # Odometry may come after all ticks that were sent with it: then those of the next one show the jump.
+            for _ in range(2):
+                self.send_odometry()
             self.diagnostics.wait_for("mlsm_core", "jumps in time", number)
             self.assert_goes_on()
 
