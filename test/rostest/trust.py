@@ -167,8 +167,8 @@ class Trust(unittest.TestCase):
         message = cls.odometry()
         strangers = [transform(one.header.frame_id, one.child_frame_id, cls.stamp()) for one in cls.strangers]
         cls.tf.publish(TFMessage([message, *strangers]))
-        # Clock and odometry come on two connections: while the first tick is answered, the odometry arrives, too.
-        for seconds in (cls.stamp() - STEP / 2.0, cls.stamp()):
+        # Clock and odometry come on two connections: while the first ticks are answered, the odometry arrives, too.
+        for seconds in cls.stamp() - STEP * np.array([0.75, 0.5, 0.25, 0.0]):
             cls.clock.publish(Clock(rospy.Time.from_sec(seconds)))
             sent = seconds + MlsmCoreParameters.transform_tolerance
             cls.corrections.wait_for(lambda found, sent=sent: abs(stamp_of(found) - sent) < 1e-3)
