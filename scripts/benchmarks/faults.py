@@ -9,6 +9,7 @@ stated deviations, and "missed" where not.
 """
 
 import re
+from argparse import ArgumentParser
 from collections import Counter
 from dataclasses import replace
 from enum import Enum
@@ -106,13 +107,19 @@ def _first_cause(trust: Trust) -> str:
     return trust.causes[0].line(float(trust.times[0])) if trust.causes else "-"
 
 
-def main() -> None:
-    """Print the table, line by line, and how many rows are what."""
-    parser = benchmark_parser("faults", __doc__)
+def fault_parser(name: str, about: str) -> ArgumentParser:
+    """Return a parser of a study that breaks recordings."""
+    parser = benchmark_parser(name, about)
     parser.add_argument("--rows", default=".", metavar="REGEX", help="which ones, of 'SOURCE: FAULT'; default: all")
     parser.add_argument("--sources", nargs="+", default=SOURCES[:2], choices=SOURCES, help="default: %(default)s")
     parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
     parser.add_argument("--seed", type=int, help="of other sizes and times than the usual ones")
+    return parser
+
+
+def main() -> None:
+    """Print the table, line by line, and how many rows are what."""
+    parser = fault_parser("faults", __doc__)
     parser.add_argument("--truth", action="store_true", help="print the distance from the truth as well")
     arguments = parser.parse_args()
     wanted, counts = re.compile(arguments.rows), Counter()

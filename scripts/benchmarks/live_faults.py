@@ -13,8 +13,7 @@ from typing import List, NamedTuple, Optional
 import numpy as np
 
 from benchmarks.fault_rows import faults
-from benchmarks.faults import SOURCES, source
-from benchmarks.harness import benchmark_parser
+from benchmarks.faults import fault_parser, source
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
@@ -103,11 +102,7 @@ def _begin(make: object) -> float:
 
 
 def _arguments() -> Namespace:
-    parser = benchmark_parser("live_faults", __doc__)
-    parser.add_argument("--rows", default=".", metavar="REGEX", help="which ones, of 'SOURCE: FAULT'; default: all")
-    parser.add_argument("--sources", nargs="+", default=SOURCES[:2], choices=SOURCES, help="default: %(default)s")
-    parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
-    parser.add_argument("--seed", type=int, help="of other sizes and times than the usual ones")
+    parser = fault_parser("live_faults", __doc__)
     kinds = [kind.value for kind in OdometryKind]
     parser.add_argument("--odometry", default=OdometryKind.AUTO.value, choices=kinds, help="default: %(default)s")
     return parser.parse_args()
