@@ -164,11 +164,13 @@ class Diagnostics:
 
     def wait_for(self, stage: str, counter: str, number: int, timeout: float = PATIENCE) -> None:
         """Wait until a counter has reached `number`; raises AssertionError with what is known of the stage."""
+        if not self.reaches(stage, counter, number, timeout):
+            raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {self.values(stage)}")
+
+    def reaches(self, stage: str, counter: str, number: int, timeout: float) -> bool:
+        """Return whether a counter reaches `number` within `timeout` s of wall time."""
         with self._condition:
-            if self._condition.wait_for(lambda: self._number(stage, counter) >= number, timeout):
-                return
-            known = self._values.get(stage)
-        raise AssertionError(f"{stage}: {counter} is not {number} after {timeout} s: {known}")
+            return self._condition.wait_for(lambda: self._number(stage, counter) >= number, timeout)
 
     def known(self, stage: str, counter: str) -> int:
         """Wait until a stage has reported, and return the counter as it is now, 0 where it has not begun to count."""
