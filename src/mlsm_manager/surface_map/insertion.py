@@ -66,6 +66,7 @@ def compile_loops() -> None:
         kept, _ = admitted(points, 1.0)
     insert_points(store, kept, 1.0)
     insert_blocks(store, store.blocks(store.rows_in_use, 1.0))
+    store.find(np.zeros(1, dtype=np.int64))
     store.remove(store.rows_in_use, np.zeros(1, dtype=np.int64))
 
 
