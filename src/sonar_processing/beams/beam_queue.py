@@ -8,8 +8,8 @@ from typing import Callable, Deque, Dict, List, Optional, Tuple
 from sonar_processing.beams.beam import Beam
 
 NEWER_BEAMS = 120  # One revolution of the usual head: tf may be late by a scan, not by more
-PATIENCE = 5.0  # s of wall time: more than twice as long as a busy machine lets a process stand still
-_MEMORY = 10  # times the beams that may wait in peace: a recording played that fast fills them within PATIENCE
+PATIENCE = 20.0  # s of wall time: more than a busy machine takes for a scan, meanwhile no beam is placed
+_MEMORY = 10  # times the beams that may wait in peace, also those of a recording that is played very fast
 
 
 @dataclass(frozen=True)
