@@ -8,8 +8,8 @@ from typing import Callable, Deque, Dict, List, Optional, Tuple
 from sonar_processing.beams.beam import Beam
 
 NEWER_BEAMS = 120  # One revolution of the usual head: tf may be late by a scan, not by more
-PATIENCE = 20.0  # s of wall time: more than a busy machine takes for a scan, meanwhile no beam is placed
-_MEMORY = 10  # times the beams that may wait in peace, also those of a recording that is played very fast
+PATIENCE = 20.0  # s of wall time: more than a busy machine lets a process stand still that tells tf something
+_MEMORY = 10  # revolutions or messages of beams: nobody took them meanwhile, or they come faster than time allows
 
 
 @dataclass(frozen=True)
@@ -24,9 +24,9 @@ class WaitingBeam:
 class BeamQueue:
     """Holds beams in the order of their stamps.
 
-    A beam has waited too long once it has done so for `PATIENCE` seconds and `NEWER_BEAMS` beams or those of a whole
-    message wait behind it. Neither of the two is enough: a recording may be played at many times its speed, and a slow
-    head sends a beam a second.
+    A beam that cannot be placed has waited too long once it has done so for `PATIENCE` seconds and `NEWER_BEAMS` beams
+    or those of a whole message wait behind it. Neither of the two is enough: a recording may be played at many times
+    its speed, and a slow head sends a beam a second. One that can be placed waits until older ones have been used.
     """
 
     def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
@@ -51,9 +51,9 @@ class BeamQueue:
         return Counter(entry.beam.frame_id for entry in self._waiting)
 
     def add(self, beam: Beam, is_moving: bool) -> Optional[WaitingBeam]:
-        """Add the newest beam; return the oldest one where it has waited too long, which is then forgotten."""
+        """Add the newest beam; return the oldest one where too many wait, which is then forgotten."""
         self._waiting.append(WaitingBeam(beam, is_moving, self._clock()))
-        return self._waiting.popleft() if self._oldest_waited_too_long() else None
+        return self._waiting.popleft() if len(self._waiting) > _MEMORY * self._most else None
 
     def pop(self, obstacle: Callable[[Beam], str]) -> List[Tuple[WaitingBeam, str]]:
         """Return and forget the beams that need not wait any more, the oldest first, each with why it cannot be placed.
@@ -82,7 +82,4 @@ class BeamQueue:
         return found
 
     def _oldest_waited_too_long(self) -> bool:
-        behind = len(self._waiting) - 1
-        if behind >= _MEMORY * self._most:
-            return True
-        return behind >= self._most and self._clock() - self._waiting[0].since > PATIENCE
+        return len(self._waiting) > self._most and self._clock() - self._waiting[0].since > PATIENCE

@@ -25,7 +25,7 @@ from sonar_processing.beams.parameters import MountingParameters
 _PATIENCE = 0.5  # s: whoever knows the frame and has started sends it at once, because /tf_static is latched
 _FEWEST = 10  # Beams of one frame that wait: a few may be broken messages
 _WAIT = 0.5  # s: beams and transforms wake the thread; this is for shutdown alone
-_CACHE = 60.0  # s that tf remembers: the beams that wait, also of a recording played at ten times its speed
+_CACHE = 180.0  # s that tf remembers: longer than the beams that wait, also while a busy machine takes none of them
 
 
 class SonarMount:

@@ -91,14 +91,16 @@ def test_a_slow_head_may_wait_longer(queue: BeamQueue, clock: Clock) -> None:
     assert queue.pop(unknown) == []
 
 
-def test_the_oldest_goes_when_nobody_takes_the_beams_for_too_long(queue: BeamQueue, clock: Clock) -> None:
+def test_beams_that_can_be_placed_wait_for_whoever_is_busy(queue: BeamQueue, clock: Clock) -> None:
     fill(queue, range(NEWER_BEAMS))
-    clock.now += PATIENCE + 0.1
-    assert fill(queue, range(NEWER_BEAMS, NEWER_BEAMS + 2)) == [0, 1]
+    clock.now += 3.0 * PATIENCE
+    assert fill(queue, range(NEWER_BEAMS, 2 * NEWER_BEAMS)) == []
+    assert len(popped(queue, 0, 1000)) == 2 * NEWER_BEAMS
 
 
 def test_a_flood_of_beams_takes_no_more_than_its_memory(queue: BeamQueue) -> None:
-    fill(queue, range(100 * NEWER_BEAMS))
+    dropped = fill(queue, range(100 * NEWER_BEAMS))
+    assert dropped[:2] == [0, 1]
     assert len(queue) <= 10 * NEWER_BEAMS
 
 
