@@ -79,9 +79,8 @@ def adjusted(fixes: PlacedFixes, known: Origin) -> Adjusted:
 def _adjusted(fixes: PlacedFixes, known: Origin) -> Adjusted:
     """Solve for east and north of the map's origin [m] and yaw in the plane of the known place."""
     there = Origin(known.latitude_deg, known.longitude_deg).points(fixes.degrees)
-    starts = [known.yaw] if known.covariance[2, 2] < _NOT_KNOWN**2 else _STARTS
-    tried = [_robust(fixes, there, start, known.covariance[2, 2]) for start in starts]
-    _, pose, squares = min(tried, key=lambda one: one[0])
+    starts = np.array([known.yaw]) if known.covariance[2, 2] < _NOT_KNOWN**2 else _STARTS
+    pose, squares = _robust(fixes, there, starts, known.covariance[2, 2])
     # A receiver whose fixes scatter more than it says is believed as much less.
     scale = max(float(np.median(squares)) / _MIDDLE, 1.0)
     inliers = np.flatnonzero(squares <= _FARTHEST * scale)
@@ -93,24 +92,26 @@ def _adjusted(fixes: PlacedFixes, known: Origin) -> Adjusted:
     return Adjusted(origin, len(inliers), outliers, "", gains, fixes.variances[chosen])
 
 
-def _robust(fixes: PlacedFixes, there: np.ndarray, yaw: float, variance: float) -> Tuple[float, np.ndarray, np.ndarray]:
-    """Return cost, pose (3,) and squared distances (n,) in deviations of a fit in which jumps hardly count.
+def _robust(fixes: PlacedFixes, there: np.ndarray, yaws: np.ndarray, variance: float) -> Tuple[np.ndarray, np.ndarray]:
+    """Return pose (3,) and squared distances (n,) in deviations of the likeliest fit in which jumps hardly count.
 
-    yaw: rad, that is expected with a variance.
+    yaws: (s,) rad, each expected with a variance, from which fits begin.
     """
     variances = fixes.deviations**2 + fixes.variances[:, np.newaxis]
-    pose = np.append(np.median(there - rotated(fixes.places, np.array(yaw)), axis=0), yaw)
+    poses = np.column_stack([np.median(there - rotated(fixes.places, yaws[:, np.newaxis]), axis=1), yaws])
     for _ in range(_ROUNDS):
-        residuals, jacobian = _residuals(fixes, there, pose)
-        squares = (residuals**2 / variances).sum(axis=1)
-        weights = 1.0 / (1.0 + squares / _FARTHEST)[:, np.newaxis] / variances
-        information = np.einsum("nak,na,nal->kl", jacobian, weights, jacobian)
-        pull = np.einsum("nak,na,na->k", jacobian, weights, residuals)
-        information[2, 2] += 1.0 / variance
-        pull[2] += (yaw - pose[2]) / variance
-        pose = pose + np.linalg.solve(information, pull)
-    squares = (_residuals(fixes, there, pose)[0] ** 2 / variances).sum(axis=1)
-    return float(np.log1p(squares / _FARTHEST).sum()), pose, squares
+        residuals, jacobian = _residuals(fixes, there, poses)
+        squares = (residuals**2 / variances).sum(axis=2)
+        weights = 1.0 / (1.0 + squares / _FARTHEST)[..., np.newaxis] / variances
+        weighted = weights[..., np.newaxis] * jacobian
+        information = np.einsum("snak,snal->skl", weighted, jacobian)
+        pull = np.einsum("snak,sna->sk", weighted, residuals)
+        information[:, 2, 2] += 1.0 / variance
+        pull[:, 2] += (yaws - poses[:, 2]) / variance
+        poses = poses + np.linalg.solve(information, pull[..., np.newaxis])[..., 0]
+    squares = (_residuals(fixes, there, poses)[0] ** 2 / variances).sum(axis=2)
+    best = np.log1p(squares / _FARTHEST).sum(axis=1).argmin()
+    return poses[best], squares[best]
 
 
 def _least_squares(
@@ -133,10 +134,13 @@ def _least_squares(
     return pose, covariance, np.einsum("kl,nal->kan", covariance, weighted)
 
 
-def _residuals(fixes: PlacedFixes, there: np.ndarray, pose: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return how far (n, 2) the fixes lie from the path, east and north [m], and its jacobian (n, 2, 3) by the pose."""
-    turned = rotated(fixes.places, pose[2])
-    jacobian = np.zeros((len(fixes), 2, 3))
-    jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
-    jacobian[:, 0, 2], jacobian[:, 1, 2] = -turned[:, 1], turned[:, 0]
-    return there - pose[:2] - turned, jacobian
+def _residuals(fixes: PlacedFixes, there: np.ndarray, poses: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return how far (..., n, 2) the fixes lie from the path, east and north [m], if the map lies at `poses` (..., 3).
+
+    And the jacobian (..., n, 2, 3) by these.
+    """
+    turned = rotated(fixes.places, poses[..., 2, np.newaxis])
+    jacobian = np.zeros((*turned.shape, 3))
+    jacobian[..., 0, 0] = jacobian[..., 1, 1] = 1.0
+    jacobian[..., 0, 2], jacobian[..., 1, 2] = -turned[..., 1], turned[..., 0]
+    return there - poses[..., np.newaxis, :2] - turned, jacobian
