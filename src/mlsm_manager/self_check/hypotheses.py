@@ -150,10 +150,11 @@ class ScanPairs:
         table = np.empty((len(changes), len(pairs)))
         for column, (one, other) in enumerate(pairs):
             tree, later = cKDTree(self._placed(self._heard[one], AS_TOLD)), self._heard[other]
-            centre = later.track.at(later.times[-1])[:2]
+            centre, factors = later.track.at(later.times[-1])[:2], {change.ranges for change in changes}
+            late = {one: self._placed(later._replace(points=one * later.points), AS_TOLD) - centre for one in factors}
             for row, (turn, ranges) in enumerate(changes):
-                late = self._placed(later._replace(points=ranges * later.points), AS_TOLD) - centre
-                table[row, column] = _apart(tree, rotated(late, np.full(len(late), turn)) + centre)
+                turns = np.full(len(later.times), turn)
+                table[row, column] = _apart(tree, rotated(late[ranges], turns) + centre)
         return table
 
     def typical_range(self) -> float:
@@ -190,7 +191,7 @@ def near_pairs(placed: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def _apart(tree: cKDTree, places: np.ndarray) -> float:
-    return float(np.minimum(tree.query(places)[0], _FAR).mean())
+    return float(np.minimum(tree.query(places, distance_upper_bound=_FAR)[0], _FAR).mean())
 
 
 def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Optional[np.ndarray] = None) -> float:
