@@ -112,11 +112,12 @@ def _doubled(beams: Sequence[PlacedBeam]) -> Optional[Cause]:
     return Cause("echoes come twice, from twice as far again, as by the surface or the hull", _CERTAIN, metres=1.0)
 
 
-def _alike_at(strengths: np.ndarray) -> List[float]:
-    """Return the correlations of the far part of a beam with its nearer parts, by the ratios of ranges."""
+def _alike_at(strengths: np.ndarray) -> np.ndarray:
+    """Return the correlations (k,) of the far part of a beam with its nearer parts, by the ratios of ranges."""
     bins = np.arange(int(_NEAREST * len(strengths)), len(strengths))
+    nearer = strengths[(bins / _RATIOS[:, np.newaxis]).astype(int)]
     with np.errstate(invalid="ignore", divide="ignore"):
-        return [float(np.corrcoef(strengths[bins], strengths[(bins / one).astype(int)])[0, 1]) for one in _RATIOS]
+        return np.corrcoef(strengths[bins], nearer)[0, 1:]
 
 
 def _loudest(placed: PlacedBeam) -> float:
