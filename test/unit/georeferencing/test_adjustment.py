@@ -141,8 +141,8 @@ def test_a_map_that_knows_its_place_is_moved_by_new_fixes_as_far_as_they_tell_mo
 
 
 def test_live_and_offline_find_the_same():
-    errors = lasting(5)
-    fixes = fixes_with(errors)
+    times = TWICE[::4]
+    fixes = fixes_with(lasting(5, times), times)
     live = LiveOrigin(AskedOrigin(None, TRUTH.azimuth_deg))
     for time, degrees, place in zip(fixes.times, fixes.degrees, fixes.places):
         origin = live.take(Fix(time, *degrees, (1.0, 1.0)), place, 0.0).origin

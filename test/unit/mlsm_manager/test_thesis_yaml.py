@@ -65,12 +65,14 @@ def run(tmp_path_factory):
     return map_bag(map_bag_arguments(arguments)), out
 
 
+@pytest.mark.long
 def test_map_bag_matches_each_cleaned_cloud_alone(run):
     summary, _ = run
     assert (summary["scans"], summary["matched"], summary["rejected"]) == (10, 9, 0)
     assert summary["blocks"] > 300
 
 
+@pytest.mark.long
 def test_its_live_yaml_makes_the_live_nodes_do_the_same(run):
     _, out = run
     live = yaml.safe_load((out / "live.yaml").read_text())
