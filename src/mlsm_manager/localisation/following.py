@@ -1,23 +1,155 @@
 """Follows the vehicle between scans: an odometry that goes on, the correction that is shown, the age of the fix."""
 
+import math
+import threading
+from collections import deque
 from dataclasses import replace
-from typing import Callable, List, Optional, Sequence, Tuple
+from typing import Callable, Deque, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.localisation.clouds import MapCloud
-from mlsm_manager.localisation.live_correction import LiveCorrection
-from mlsm_manager.localisation.place_now import FixAge, PlaceNow
+from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import ScanUpdate
+from mlsm_manager.odometry.mending import with_trembling_smoothed
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
-from mlsm_manager.odometry.trembling import with_trembling_smoothed
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
+from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, advanced, advanced_path, carried_on
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.scan_matching.scan_path import POSE
+from mlsm_manager.scan_matching.scan_path import POSE, POSITION, RATE
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.live_causes import LiveCauses
-from node_support.geometry import composed, inverse, transformed
+from node_support.geometry import composed, inverse, transformed, wrapped
+from node_support.timing import UsualInterval
+
+# Of the odometry: a minute at 60 per second, longer than a scan and its match take.
+_MOST_SAMPLES = 4000
+_IDENTITY = np.zeros(3)
+
+
+class LiveCorrection:
+    """The correction map -> odom between scans, without jumps: the odometry's errors that were found go on.
+
+    Follows the odometry from the last belief to now. A new belief is approached within `blend_time` seconds.
+
+    Where a belief says how its rates fade, the vehicle is shown to come to rest once the next belief is overdue.
+
+    Safe to use from several threads: one gives it beliefs, another asks for samples.
+    """
+
+    def __init__(self, blend_time: float) -> None:
+        self.blend_time = blend_time
+        self._lock = threading.RLock()
+        self.clear()
+
+    def clear(self) -> None:
+        """Forget everything, because time jumped or the map is gone."""
+        with self._lock:
+            self.start = _IDENTITY
+            self._samples: Deque[Tuple[float, np.ndarray]] = deque(maxlen=_MOST_SAMPLES)
+            self._state: Optional[np.ndarray] = None
+            self._state_time = -math.inf
+            self._jump = _IDENTITY
+            self._jump_time: Optional[float] = None
+            self._shown: Optional[np.ndarray] = None
+            self._fading: Optional[Fading] = None
+            self._beliefs = UsualInterval()
+
+    def start_from(self, correction: np.ndarray) -> None:
+        """Show `correction` T_map_odom (3,) until the first belief."""
+        with self._lock:
+            self.start = np.array(correction, dtype=np.float64)
+
+    def believe(self, belief: Belief) -> None:
+        """Take what a match found at a time in the past; the samples since then bring it to now."""
+        with self._lock:
+            self._state, self._fading = np.array(belief.theta), belief.fading
+            start = self._state_time = belief.time
+            self._beliefs.take(start)
+            later = [sample for sample in self._samples if sample[0] > belief.time]
+            earlier = [sample for sample in self._samples if sample[0] <= belief.time]
+            if later:
+                known = earlier[-1:] + later
+                times = np.array([time for time, _ in known])
+                track = Track(times, np.array([pose for _, pose in known]))
+                self._bring_on(start, track, times[times > start])
+            if self._shown is not None and self._samples:
+                self._jump = composed(inverse(self._state[POSE]), self._shown)
+                self._jump[2] = wrapped(self._jump[2])
+                self._jump_time = None
+
+    def sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        """Take T_odom_base (3,) at `time` [s] and return T_map_odom (3,) to be shown now.
+
+        Times that do not increase change nothing.
+        """
+        with self._lock:
+            odometry = np.asarray(odometry, dtype=np.float64)
+            if self._samples and time <= self._samples[-1][0]:
+                time, odometry = self._samples[-1]
+            else:
+                self._follow(time, odometry)
+                self._samples.append((time, odometry))
+            if self._state is None:
+                return self.start
+            if self._jump_time is None:
+                self._jump_time = time
+            left = self._share_left(time - self._jump_time)
+            self._shown = composed(self._state[POSE], left * self._jump) if left else self._state[POSE].copy()
+            return _correction(self._shown, odometry)
+
+    def standing_sample(self, time: float, odometry: np.ndarray) -> np.ndarray:
+        """Return what `sample` does for an odometry without times, in which no error can go on after a belief."""
+        with self._lock:
+            if self._state is not None:
+                self._state[RATE], self._fading = 0.0, None
+            return self.sample(time, odometry)
+
+    def _follow(self, time: float, odometry: np.ndarray) -> None:
+        if self._state is None or not self._samples:
+            return
+        if time <= self._state_time:
+            return
+        before, pose = self._samples[-1]
+        if before < self._state_time:
+            # A belief that is newer than the newest sample: what the odometry did before it is part of it.
+            track = Track(np.array([before, time]), np.array([pose, odometry]))
+            before, pose = self._state_time, track.at(np.array(self._state_time))
+        self._step(before, pose, time, odometry)
+
+    def _bring_on(self, start: float, track: Track, times: np.ndarray) -> None:
+        """Bring the state from `start` [s] to the newest of `times` (n,), n > 0."""
+        if self._fading is None:
+            self._state[POSE] = advanced_path(self._state, start, track, times)[-1]
+            return
+        nodes = np.append(start, times)
+        poses = track.at(nodes)
+        for number in range(len(times)):
+            self._step(nodes[number], poses[number], nodes[number + 1], poses[number + 1])
+
+    def _step(self, before: float, pose: np.ndarray, time: float, odometry: np.ndarray) -> None:
+        """Bring the state from `before` to `time` [s], between which the odometry goes from `pose` to `odometry`."""
+        if self._fading is None:
+            self._state[POSE] = advanced(self._state, time - before, pose, odometry)
+            return
+        fading = self._fading.to_a_stop() if self._beliefs.overdue(time) else self._fading
+        later = fading.after(self._state[RATE], time - before)
+        self._state[RATE] = (self._state[RATE] + later) / 2.0
+        self._state[POSE] = advanced(self._state, time - before, pose, odometry)
+        self._state[RATE] = later
+
+    def _share_left(self, seconds: float) -> float:
+        if self.blend_time <= 0.0:
+            return 0.0
+        return min(max(1.0 - seconds / self.blend_time, 0.0), 1.0)
+
+
+def _correction(T_map_base: np.ndarray, T_odom_base: np.ndarray) -> np.ndarray:
+    """Return T_map_odom (3,), with its yaw in [-pi, pi); in plain numbers, which is faster for a single pose."""
+    x, y, yaw = T_odom_base.tolist()
+    turn = float(T_map_base[2]) - yaw
+    cos, sin = math.cos(turn), math.sin(turn)
+    return np.array([T_map_base[0] - cos * x + sin * y, T_map_base[1] - sin * x - cos * y, wrapped(turn)])
 
 
 class Following:
@@ -31,17 +163,19 @@ class Following:
         """See Localiser."""
         self.live = LiveCorrection(blend_time)
         self.odometry = ContinuousOdometry(limits)
-        self._age = FixAge()
         self.found = LiveCauses()
         self._clock = clock
-        self._came: Optional[Tuple[float, float]] = None
-        self.resumed_at: Optional[StoredPlace] = None
+        self.clear()
 
     def clear(self) -> None:
         """Forget everything, because time jumped or the map is gone."""
-        for part in (self.live, self.odometry, self._age, self.found):
+        for part in (self.live, self.odometry, self.found):
             part.clear()
-        self._came = self.resumed_at = None
+        self._came: Optional[Tuple[float, float]] = None
+        self.resumed_at: Optional[StoredPlace] = None
+        self._intervals, self._fixes = UsualInterval(), 0
+        self._fixed_at: Optional[float] = None
+        self._believed: Optional[Tuple[float, np.ndarray]] = None
 
     def bridged(self, track: Track) -> Track:
         """Return a track that begins where the vehicle was when its place was stored; see StoredPlace.bridged."""
@@ -75,19 +209,21 @@ class Following:
         """
         if update.belief is not None:
             self.live.believe(update.belief)
-            self._age.learn_odometry(scan.reference_time, scan.reference_pose)
+            self._believed = scan.reference_time, scan.reference_pose
             if is_compared:
                 self.found.take(scan, update.belief.theta[POSE])
         if not update.accepted or update.result is None:
             return update
-        self._age.learn_fix(scan.reference_time)
+        self._fixed_at = scan.reference_time
+        self._intervals.take(self._fixed_at)
+        self._fixes += 1
         return replace(update, result=update.result.widened(self.found.covariance(self._wrong)))
 
     def followed(self, track: Track, time: float) -> Track:
         """Learn an odometry up to `time` [s], where a belief is brought to; return it as one that goes on."""
         self.odometry.take(track)
         followed = self.odometry.followed(track)
-        self._age.learn_odometry(time, followed.at(np.array(time)))
+        self._believed = time, followed.at(np.array(time))
         return followed
 
     def correction(self, time: float, odometry: np.ndarray) -> np.ndarray:
@@ -109,9 +245,18 @@ class Following:
         return self.live.standing_sample(scan_time + since, odometry)
 
     def place_at(self, time: float, odometry: np.ndarray, belief: Belief, errors: OdometryErrors) -> Optional[PlaceNow]:
-        """Return how old and how good the position is at `time` [s], when the odometry says T_odom_base (3,)."""
-        pose = composed(self.odometry.fixes(np.array(time)), odometry)
-        return self._age.place_at(time, pose, belief, errors, self.found.covariance(self._wrong))
+        """Return how old and how good the position is at `time` [s], when the odometry says T_odom_base (3,).
+
+        None before the first fix.
+        """
+        if self._fixed_at is None or self._believed is None:
+            return None
+        if time > belief.time and self._believed[0] == belief.time:
+            pose = composed(self.odometry.fixes(np.array(time)), odometry)
+            belief = carried_on(belief, self._believed[1], pose, time, errors)
+        covariance = belief.covariance[POSE, POSE].copy()
+        covariance[POSITION, POSITION] += self.found.covariance(self._wrong)
+        return PlaceNow(time, time - self._fixed_at, self._intervals.overdue(time), covariance, self._fixes)
 
     @property
     def last_fix(self) -> np.ndarray:

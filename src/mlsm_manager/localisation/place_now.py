@@ -1,18 +1,16 @@
-"""How old the newest fix is, how well the position is known now that the odometry alone has carried it on, and why."""
+"""How old the newest fix is, how well the position is known now, what speaks against it, and how that is told."""
 
 from enum import IntEnum
 from typing import List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, carried_on
-from mlsm_manager.scan_matching.scan_path import POSE, POSITION
+from mlsm_manager.scan_matching.scan_path import POSITION
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.headline import FEWEST_MATCHED
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health, Level
-from node_support.timing import UsualInterval
 
 _TOLD = 60.0  # s: so long a fault that was left out is told: some turns of the head, which show the place
 
@@ -42,45 +40,6 @@ class PlaceNow(NamedTuple):
     def deviation(self) -> float:
         """Root of both variances' sum, m."""
         return float(np.sqrt(max(np.trace(self.covariance[POSITION, POSITION]), 0.0)))
-
-
-class FixAge:
-    """Remembers the newest fix, and the odometry when the belief was made."""
-
-    def __init__(self) -> None:
-        self.clear()
-
-    def clear(self) -> None:
-        """Forget the fixes, because time jumped or the map is gone."""
-        self._fixes = UsualInterval()
-        self._count = 0
-        self._fixed_at: Optional[float] = None
-        self._believed: Optional[Tuple[float, np.ndarray]] = None
-
-    def learn_fix(self, time: float) -> None:
-        """Learn that the scan that ended at `time` [s] was matched."""
-        self._fixes.take(time)
-        self._count += 1
-        self._fixed_at = time
-
-    def learn_odometry(self, time: float, pose: np.ndarray) -> None:
-        """Learn T_odom_base (3,) at the time [s] of the newest belief."""
-        self._believed = time, pose
-
-    def place_at(
-        self, time: float, pose: np.ndarray, belief: Belief, errors: OdometryErrors, added: np.ndarray
-    ) -> Optional[PlaceNow]:
-        """Return what is known at `time` [s], when the odometry says T_odom_base (3,); None before the first fix.
-
-        added: (2, 2) m^2, what causes add to the covariance of the position.
-        """
-        if self._fixed_at is None or self._believed is None:
-            return None
-        if time > belief.time and self._believed[0] == belief.time:
-            belief = carried_on(belief, self._believed[1], pose, time, errors)
-        covariance = belief.covariance[POSE, POSE].copy()
-        covariance[POSITION, POSITION] += added
-        return PlaceNow(time, time - self._fixed_at, self._fixes.overdue(time), covariance, self._count)
 
 
 def doubts_of(

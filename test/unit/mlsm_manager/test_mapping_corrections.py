@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from made_scans import at_velocity, still
 
 from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
-from mlsm_manager.localisation.live_correction import LiveCorrection
+from mlsm_manager.localisation.following import LiveCorrection
 from mlsm_manager.scan_matching.prediction import Belief, Fading
 from mlsm_manager.scan_matching.scan import Track
 
