@@ -20,7 +20,7 @@ from benchmarks.paths import PathFigures, judged
 from benchmarks.scans import KINDS, SonarKind
 from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TWINS
-from benchmarks.twins import twin_of
+from benchmarks.twin_water import twin_of
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.run_files import aligned_truth, positions_at

@@ -1,18 +1,24 @@
-"""Water around a path as a raster, and what a scanning sonar with a beam of some width hears in it."""
+"""Twins of a recorded run: its path and timing, in other water and with other errors.
 
-from dataclasses import dataclass
+The water is a raster around the path; a scanning sonar with a beam of some width hears it.
+"""
+
+from dataclasses import dataclass, replace
 from typing import Tuple
 
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
-from benchmarks.twin_conditions import TwinParameters
-from node_support.geometry import rotated
+from benchmarks.twin_conditions import TwinParameters, reported, true_path
+from mlsm_manager.offline.recording import Recording, Truth
+from node_support.geometry import matrices, rotated
+from sonar_processing.beams.beam import PlacedBeam
 
 RESOLUTION = 0.2  # m: a tenth of the accuracy that is looked for
 _MARGIN = 80.0  # m around the path, more than the sonar's range
 _CLEARANCE = 5.0  # m around the path in which nothing stands
 _CANAL_SMOOTHING = 600  # samples of the path, 60 s: banks do not follow a vehicle's weaving
+_AT_ENDS = 2.0  # s at both ends of the recording without beams, so that odometry covers delayed beams
 
 
 @dataclass(frozen=True)
@@ -176,3 +182,29 @@ def _add_clutter(image: np.ndarray, share: float, rng: np.random.RandomState) ->
     for beam in np.flatnonzero(rng.rand(len(image)) < share):
         start = rng.randint(20, BINS - 20)
         image[beam, start : start + rng.randint(5, 30)] = _BINARY
+
+
+def twin_of(source: Recording, parameters: TwinParameters) -> Recording:
+    """Return a recording with the path and timing of `source` and conditions of its own; the truth is known."""
+    rng = np.random.RandomState(parameters.seed)
+    path = true_path(source.track, parameters)
+    water = made_water(path.poses[:, :2], parameters, rng)
+    odometry = reported(path, parameters, rng)
+    stamps = np.array([placed.beam.stamp_ns for placed in source.beams]) * 1e-9
+    inside = (stamps > path.times[0] + _AT_ENDS) & (stamps < path.times[-1] - _AT_ENDS)
+    beams = [placed.beam for placed, kept in zip(source.beams, inside) if kept]
+    stamps = stamps[inside]
+    T_base_sonar = (
+        np.linalg.inv(matrices(source.track.at(stamps[:1]))[0])
+        @ source.beams[int(np.flatnonzero(inside)[0])].T_target_sonar
+    )
+    mounting = np.arctan2(T_base_sonar[1, 0], T_base_sonar[0, 0])
+    bearings = np.array([beam.angle for beam in beams]) + mounting
+    poses = path.at(stamps + parameters.delay)
+    strengths = heard(water, poses, bearings, T_base_sonar[:2, 3], parameters, rng)
+    places = matrices(odometry.at(stamps)) @ T_base_sonar
+    made = [
+        PlacedBeam(replace(beam, intensities=row), place, True) for beam, row, place in zip(beams, strengths, places)
+    ]
+    times = np.arange(path.times[0], path.times[-1], 1.0)
+    return Recording(made, 0, odometry, Truth(times, path.at(times)[:, :2]))
