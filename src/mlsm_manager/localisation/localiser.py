@@ -183,7 +183,9 @@ class Localiser:
         """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did.
 
         odometry: T_odom_base (3,) of that time, where `time` is its own. Where it goes on as if nothing had happened
-        only the clock jumped, back or far forward, and the vehicle is expected where it was.
+        only the clock jumped, back or far forward, and the vehicle is expected where it was. Otherwise a recording
+        began again, which is expected to have begun in odom's origin, or odometry is missing: three scans that do not
+        fit there tell, and then the whole map is searched.
         """
         until = self.believed_until
         if until is None or until - _JUMP_BACK <= time <= until + _LEAP:
@@ -193,10 +195,13 @@ class Localiser:
             if time > until and not goes_on:
                 return 0.0
             place = StoredPlace(self.last_correction, self.estimator.belief)
+            if not goes_on:
+                place = StoredPlace(np.zeros(3), belief_at(time, np.zeros(3), self.estimator.errors))
             self._forget_place()
-            self._search.jump()
-            if goes_on:
+            if goes_on or self._search.is_known:
                 self._expect(place.correction, place.widened)
+            else:
+                self._search.lose()
         return until - time
 
     def expect(self, pose: np.ndarray, covariance: np.ndarray, odometry: np.ndarray) -> None:
@@ -270,11 +275,6 @@ class Localiser:
     def is_lost(self) -> bool:
         """Whether a map was loaded, scans are matched, and the vehicle is not found in the map yet."""
         return self._search.is_lost and self.estimator.matching
-
-    @property
-    def is_expected(self) -> bool:
-        """Whether the next scans are searched about where the vehicle is expected."""
-        return self._search.may_be_near
 
     @property
     def blocks(self) -> Blocks:

@@ -64,10 +64,10 @@ class PlaceSearch:
         self.forget()
         self._left = 0
 
-    def jump(self) -> None:
-        """Learn that time jumped: what was expected does not hold any more."""
-        if self._left is not None:
-            self.lose()
+    @property
+    def is_known(self) -> bool:
+        """Whether the place is known: neither expected nor lost."""
+        return self._left is None
 
     @property
     def is_lost(self) -> bool:

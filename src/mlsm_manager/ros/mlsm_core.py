@@ -258,10 +258,8 @@ class MlsmCore:
         if seconds:
             self._odometry.clear()
             self._z_down, self.status.verdicts = ZDownSigns(), ()
-            place = "the vehicle is expected where it was" if self._localiser.is_expected else (
-                "the position in it starts at odom's again"
-            )  # fmt: skip
-            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, {place}")
+            place = "where it was" if np.any(self._localiser.last_correction) else "where odom's origin is map's"
+            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, the vehicle is expected {place}")
 
     def _after_replacing(self) -> None:
         self.status.verdicts = ()
