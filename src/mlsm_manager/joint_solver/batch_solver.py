@@ -248,7 +248,7 @@ class _Batch:
         compass, motion = self._odometry.compass, self._motion
         if compass is None:
             return np.zeros((len(nodes), POSE_COLUMNS, POSE_COLUMNS))
-        columns = by_heading(compass, self._layout, motion.poses[:, YAW], np.diff(motion.times), self._solution.solve)
+        columns = by_heading(compass, self._layout, motion.poses[:, YAW], motion.times, self._solution.solve)
         moved = columns[self._layout.pose_columns(nodes)]
         return moved @ moved.transpose(0, 2, 1)
 

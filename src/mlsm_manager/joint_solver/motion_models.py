@@ -5,7 +5,7 @@ velocity_models those of which the velocity is unknown.
 """
 
 from dataclasses import dataclass, replace
-from typing import Callable, Dict, Mapping, NamedTuple, Optional, Protocol
+from typing import Callable, Dict, Mapping, NamedTuple, Optional, Protocol, Tuple
 
 import numpy as np
 
@@ -22,6 +22,7 @@ DIRECTION, SCALE, CURRENT_X, CURRENT_Y = 3, 4, 5, 6  # columns of the nodes, aft
 _CONSTANT_DEVIATION = 1e-6  # of what hardly changes from node to node, far below any effect
 # Of an odometry with which something is wrong: rad, s within which a compass may err otherwise as the vehicle turns.
 _FREED_HEADING, _FREED_TIME = 0.15, 60.0
+_TURN_WALK = 0.22  # rad/sqrt(s): by turns of 0.05 rad/s that last 10 s, of which a compass that is stuck tells nothing
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,10 @@ class OdometryModel(Protocol):
     def freed(self) -> "Optional[OdometryModel]":
         """The model of an odometry with which something is wrong; None where nothing is known that could be."""
         return None
+
+    def stuck(self, begin: float, end: float) -> "OdometryModel":
+        """Return the model of an odometry whose compass tells nothing from `begin` to `end` [s], where it has one."""
+        return self
 
     @property
     def calibrated(self) -> Dict[str, int]:
@@ -133,17 +138,22 @@ class Compass:
     """How wrong the reported heading may be: standard deviations [rad], how long an error lasts [s].
 
     It errs differently where iron is near: for some minutes at the speed of a small vehicle. heading_walk: rad/sqrt(s),
-    white noise of the turn rate besides.
+    white noise of the turn rate besides. stuck: s, from when to when it tells nothing.
     """
 
     heading_deviation: float
     heading_correlation_time: float
     heading_walk: float
+    stuck: Tuple[Tuple[float, float], ...] = ()
 
-    def change(self, durations: np.ndarray) -> Change:
-        """Return how the correction of the reported heading changes: an error that lasts, and a walk."""
+    def change(self, times: np.ndarray) -> Change:
+        """Return how the correction of the reported heading changes from time to time: an error that lasts, a walk."""
+        durations = np.diff(times)
         kept = np.exp(-durations / self.heading_correlation_time)
-        return Change(kept, self.heading_deviation**2 * (1.0 - kept**2) + self.heading_walk**2 * durations)
+        variance = self.heading_deviation**2 * (1.0 - kept**2) + self.heading_walk**2 * durations
+        for begin, end in self.stuck:
+            variance += _TURN_WALK**2 * np.diff(np.clip(times, begin, end))
+        return Change(kept, variance)
 
     @property
     def freed(self) -> "Compass":
@@ -152,18 +162,19 @@ class Compass:
 
 
 def add_changes(
-    equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray,
+    equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, times: np.ndarray,
     walks: Mapping[int, float], changes: Mapping[int, Change], compass: Optional[Compass],
 ) -> None:  # fmt: skip
-    """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width).
+    """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width), at `times` [s].
 
     Both by columns of a node. walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others.
     compass: that of which YAW is the error; None without one.
     """
+    durations = np.diff(times)
     one = np.ones(len(durations))
     changes = {**changes, **{column: Change(one, each**2 * durations) for column, each in walks.items()}}
     if compass is not None:
-        changes[YAW] = compass.change(durations)
+        changes[YAW] = compass.change(times)
     columns, values = np.array(list(changes))[:, np.newaxis], nodes[:, list(changes)].T
     kept, variances = (np.stack(each) for each in zip(*changes.values()))
     places = np.stack([starts + nodes.shape[1] + columns, starts + columns], axis=-1)

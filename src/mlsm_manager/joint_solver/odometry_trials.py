@@ -12,6 +12,7 @@ from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import rotated
 
 
 @dataclass(frozen=True)
@@ -55,6 +56,20 @@ def fit_with(run: Solution, track: Track, stretch: Optional[Tuple[float, float]]
     nodes[:, : YAW + 1] += run.log.node_poses(numbers) - log.node_poses(numbers)
     if stretch is not None:
         nodes = reckoned(run, log, nodes, stretch)
+    return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
+
+
+def fit_turned(run: Solution, track: Track) -> BatchResult:
+    """Return the fit of a run if its odometry had reported `track`, whose headings are others.
+
+    It begins with the way that the run went, each step in the vehicle's own frame.
+    """
+    log, nodes = run.log.since(0, OdometryLog.of(track)), run.state.nodes.copy()
+    numbers = np.arange(len(nodes))
+    before, after = run.log.node_poses(numbers), log.node_poses(numbers)
+    places, turns = before[:, :YAW] + nodes[:, :YAW], after[:, YAW] - before[:, YAW]
+    steps = rotated(np.diff(places, axis=0), (turns[1:] + turns[:-1]) / 2.0)
+    nodes[1:, :YAW] = places[0] + np.cumsum(steps, axis=0) - after[1:, :YAW]
     return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
 
 

@@ -115,7 +115,7 @@ class DvlFactors(OdometryModel):
     def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
         durations = np.diff(motion.times)
         self._add_positions(equations, starts, nodes, motion, durations)
-        add_changes(equations, starts, nodes, durations, self._walks, {}, self.compass)
+        add_changes(equations, starts, nodes, motion.times, self._walks, {}, self.compass)
 
     def _add_positions(
         self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion, durations: np.ndarray

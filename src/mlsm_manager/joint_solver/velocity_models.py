@@ -80,6 +80,10 @@ class HeadingFactors(OdometryModel):
     def freed(self) -> "HeadingFactors":
         return HeadingFactors(HeadingOdometry(self._speeds, self.compass.freed))
 
+    def stuck(self, begin: float, end: float) -> "HeadingFactors":
+        stuck = (*self.compass.stuck, (begin, end))
+        return HeadingFactors(HeadingOdometry(self._speeds, replace(self.compass, stuck=stuck)))
+
     def first_node(self) -> np.ndarray:
         return np.zeros(self.width)
 
@@ -126,7 +130,7 @@ class HeadingFactors(OdometryModel):
         durations = np.diff(motion.times)
         self._add_positions(equations, starts, nodes, motion)
         walks = {TRAVEL: self._speeds.travel_walk}
-        add_changes(equations, starts, nodes, durations, walks, self._changes(durations), self.compass)
+        add_changes(equations, starts, nodes, motion.times, walks, self._changes(durations), self.compass)
         self._add_speeds_ahead(equations, starts, nodes, durations)
 
     def _first_heading(self) -> float:
@@ -254,14 +258,14 @@ _TIMES = np.array([5.0, 5.0, 1.0, 1.0])
 
 
 def by_heading(
-    compass: Compass, layout: Layout, yaws: np.ndarray, durations: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]
+    compass: Compass, layout: Layout, yaws: np.ndarray, times: np.ndarray, solve: Callable[[np.ndarray], np.ndarray]
 ) -> np.ndarray:
     """Return columns (size, 4) whose outer product is what the error adds to the covariance of all unknowns.
 
-    yaws: (n,) rad, reported at the nodes of `layout`, with (n - 1,) s between them. solve: the information's inverse
+    yaws: (n,) rad, reported at the nodes of `layout`, at `times` (n,) [s]. solve: the information's inverse
     times columns. The error is an unknown of its own that is eliminated; the solution stays where it is.
     """
-    errors, change = harmonics(yaws) * _TIMES * compass.heading_deviation, compass.change(durations)
+    errors, change = harmonics(yaws) * _TIMES * compass.heading_deviation, compass.change(times)
     steps = errors[1:] - change.kept[:, np.newaxis] * errors[:-1]
     weighted = steps / change.variance[:, np.newaxis]
     first = errors[0] / compass.heading_deviation**2

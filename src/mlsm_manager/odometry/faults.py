@@ -25,10 +25,11 @@ class FaultKind(Enum):
     LENGTH = "all reported distances are wrong"
     DISTANCES = "reported distances changed"
     CARRIED = "a current carried the vehicle, and the odometry did not feel it"
+    STUCK = "the compass stuck"
 
 
 OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
-_OF_PAIRS = (FaultKind.SLIP, FaultKind.CARRIED)  # that pairs of scans show
+_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK)  # that pairs of scans or headings show
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 
 
@@ -37,7 +38,7 @@ class MotionFault:
     """begin: s, of a drift, a step or a change; NaN where it holds all along.
 
     sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; the
-    logarithm of a factor; or x y [m/s] in odom. end: s, of a current.
+    logarithm of a factor; or x y [m/s] in odom. end: s, of a current, or of a heading that stuck.
     """
 
     kind: FaultKind
@@ -53,6 +54,10 @@ class MotionFault:
     def text(self) -> str:
         """What is wrong and by how much."""
         size = float(np.linalg.norm(self.sizes))
+        if self.kind is FaultKind.STUCK:
+            return (
+                f"the compass stuck for {self.end - self.begin:.0f} s and missed {np.degrees(self.sizes[0]):.0f} deg,"
+            )
         if self.kind in OF_DISTANCES:
             return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
         if self.kind is FaultKind.DRIFT:
@@ -66,7 +71,7 @@ class MotionFault:
 
     def is_beyond(self, end: float) -> bool:
         """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
-        if self.kind is FaultKind.CARRIED:
+        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK):
             return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind is FaultKind.DRIFT else 1.0)
         return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
@@ -80,7 +85,7 @@ class MotionFault:
             since = np.clip(track.times - self.begin, 0.0, self.end - self.begin)
             return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
         steps = composed(inverse(track.poses[:-1]), track.poses[1:])
-        errors = _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
+        errors = self._errors(track)
         if self.kind in OF_DISTANCES:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])
             return track.with_poses(integrated(track.poses[0], steps))
@@ -89,6 +94,12 @@ class MotionFault:
             return track.with_poses(np.column_stack([track.poses[:, :2], yaws]))
         steps[:, 2] = np.diff(yaws)
         return track.with_poses(integrated(np.append(track.poses[0, :2], yaws[0]), steps))
+
+    def _errors(self, track: Track) -> np.ndarray:
+        """Return what mends the logarithms of distances, or the headings [rad], (m,). Stuck headings turn evenly."""
+        if self.kind is FaultKind.STUCK:
+            return self.sizes[0] * np.clip((track.times - self.begin) / (self.end - self.begin), 0.0, 1.0)
+        return _COLUMNS[self.kind](track.times, track.poses[:, 2], self.begin) @ np.array(self.sizes)
 
 
 def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
@@ -122,7 +133,7 @@ def likely_faults(times: np.ndarray, yaws: np.ndarray, headings: np.ndarray, sca
     """
     logs, found = np.log1p(np.maximum(scales, -0.9)), []
     for kind in FaultKind:
-        if kind in _OF_PAIRS:
+        if kind in _SEEN:
             continue
         values = logs if kind in OF_DISTANCES else headings
         tried = [_explained(kind, times, yaws, values, float(begin)) for begin in _begins(times, kind)]

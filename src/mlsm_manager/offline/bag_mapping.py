@@ -96,7 +96,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     _tell_of_refused(replayed, options)
     found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
     of_echoes = [*mounted, *found.causes]
-    of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track)]
+    of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
     refined, refitted = None, []
     if options.refine:
         with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:

@@ -6,7 +6,7 @@ from typing import Any, Dict, Iterable, List, Optional, Sequence, Union
 import numpy as np
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
-from mlsm_manager.odometry.faults import MotionFault
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
 
@@ -16,6 +16,11 @@ _SPEED_CHANGE, _TURN_RATE = 0.15, 0.05  # m/s, rad/s: by which a small vehicle c
 _LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, besides what it did just before
 
 Fault = Union[MotionFault, SonarFault]
+
+
+def is_same(one: Optional[Fault], other: Fault) -> bool:
+    """Return whether two faults are one: of most kinds a run has one only, but a compass may stick several times."""
+    return one is not None and one.kind is other.kind and (one.kind is not FaultKind.STUCK or one.begin == other.begin)
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,8 @@ def of_steps(steps: Sequence[Step]) -> List[Cause]:
 
 def of_stuck(begin: float, end: float) -> Cause:
     """Return the cause for a heading that stood from `begin` to `end` [s] while the vehicle went on."""
-    return Cause(f"the compass stuck for {end - begin:.0f} s", CERTAIN, begin, turn=np.pi / 2.0)
+    fault = MotionFault(FaultKind.STUCK, begin, (0.0,), end)
+    return Cause(f"the compass stuck for {end - begin:.0f} s", CERTAIN, begin, turn=np.pi / 2.0, fault=fault)
 
 
 def _of_kind(steps: List[Step]) -> List[Cause]:

@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_with, freed_errors
+from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_turned, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import (
     SonarFault,
@@ -19,9 +19,9 @@ from mlsm_manager.joint_solver.sonar_trials import (
     likeliest,
     likelihood_across,
 )
-from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
+from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, MotionFault, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause, Fault
+from mlsm_manager.self_check.causes import CERTAIN, Cause, Fault, is_same
 from mlsm_manager.self_check.course import LARGEST, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
@@ -37,6 +37,7 @@ _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in par
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
 _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
 _ROUNDS = 2
+_TURNED = np.radians(15.0)  # between turns that are tried of a vehicle whose compass stuck: scans then still meet
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
 _GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
 _FAULTS = 3  # at most, one after the other
@@ -121,9 +122,9 @@ class MotionFindings:
         """
         if any(cause.fault is None for cause in of_echoes):
             return [*of_echoes, *of_beams]
-        kinds = [cause.fault.kind for cause in self.causes if cause.fault is not None]
-        unexplained = [cause for cause in of_beams if cause.fault is None or cause.fault.kind not in kinds]
-        return [*(self.causes or of_echoes), *unexplained]
+        faults = [cause.fault for cause in self.causes if cause.fault is not None]
+        told = self.causes or of_echoes
+        return [*told, *(cause for cause in of_beams if not any(is_same(cause.fault, one) for one in faults))]
 
     def placed(self, scan: Scan, reported: Track, sonar_in_base: np.ndarray) -> Scan:
         """Return a scan that was placed by `reported` and `sonar_in_base` (2,) [m] as this run places it."""
@@ -159,6 +160,7 @@ def motion_findings(
     if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not _tells(track):
         return found
     first = places = _places(run)
+    suspected = [one for fault in suspected for one in _possible(fault)]
     for _ in range(_FAULTS + 1):
         errors = freed_errors(found.run)
         if errors is None:
@@ -172,7 +174,7 @@ def motion_findings(
         if best.gain < needed or not best.fault.is_beyond(errors.times[-1]):
             break
         found = _without(found, best)
-        suspected = [fault for fault in suspected if fault.kind is not best.fault.kind]
+        suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
     others = [places, first] if found.causes else [places] if _errs(errors) else []
     return replace(found, apart=[other - _places(found.run) for other in others])
 
@@ -237,7 +239,16 @@ def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:
     return best
 
 
+def _possible(fault: Fault) -> List[Fault]:
+    """Return what a suspected fault may be: nobody tells how far a vehicle turned while its compass stuck."""
+    if fault.kind is not FaultKind.STUCK:
+        return [fault]
+    return [replace(fault, sizes=(float(turn),)) for turn in np.arange(-np.pi, np.pi, _TURNED)]
+
+
 def _beside(fault: Fault) -> List[Fault]:
+    if fault.kind is FaultKind.STUCK:
+        return [replace(fault, sizes=(fault.sizes[0] + turn,)) for turn in (-_TURNED / 3.0, _TURNED / 3.0)]
     if not isinstance(fault, SonarFault):
         return [fault.times(factor) for factor in _LARGER]
     others = [fault.times(factor) for factor in _BESIDE]
@@ -247,6 +258,8 @@ def _beside(fault: Fault) -> List[Fault]:
 
 
 def _tried(found: MotionFindings, fault: Fault) -> _Trial:
+    if fault.kind is FaultKind.STUCK:
+        return _tried_turn(found, fault)
     if isinstance(fault, SonarFault):
         run, fit = fit_without(found.run, fault)
         return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
@@ -254,6 +267,15 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
     run = replace(found.run, log=found.run.log.since(0, OdometryLog.of(track)))
     fit = fit_with(found.run, track, span)
+    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood)
+
+
+def _tried_turn(found: MotionFindings, fault: MotionFault) -> _Trial:
+    """Return the trial of a turn that a stuck compass missed; when the vehicle turned meanwhile the echoes tell."""
+    track, model = fault.mended(found.track), found.run.odometry.stuck(fault.begin, fault.end)
+    run = replace(found.run, parameters=replace(found.run.parameters, odometry=model))
+    fit = fit_turned(run, track)
+    run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
     return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood)
 
 
@@ -273,5 +295,6 @@ def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:
     # With a compass alone it may as well be the ranges before it that are wrong, and with them the size of all.
     is_size = found.is_alone and isinstance(fault, SonarFault) and fault.kind is SonarKind.RANGES
     length = float(np.abs(np.expm1(-fault.sizes[0])) / np.sqrt(2.0)) if is_size else 0.0
-    cause = Cause(fault.text, trial.gain, fault.begin, length=length, fault=fault)
+    certain = CERTAIN if fault.kind is FaultKind.STUCK else 0.0  # that it did its headings tell
+    cause = Cause(fault.text, certain + trial.gain, fault.begin, length=length, fault=fault)
     return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

@@ -4,9 +4,9 @@ from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.odometry.mending import standing_stretches
+from mlsm_manager.odometry.mending import standing_stretches, stuck_headings
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.causes import Cause, of_stuck
 from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs
 
 _FEWEST_PAIRS = 3
@@ -16,10 +16,18 @@ _FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle
 
 
-def standing_causes(scans: Sequence[Scan], track: Track) -> List[Cause]:
-    """Return the stretches in which T_odom_base stands while scans do not lie on each other as they do elsewhere."""
+def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> List[Cause]:
+    """Return the stretches in which T_odom_base stands while scans do not lie on each other as they do elsewhere.
+
+    Where it tells no positions, those in which it stands though the vehicle went on. path: (m, >= 2) m, the way that it
+    went by the solver.
+    """
     stretches = [(float(track.times[first]), float(track.times[last])) for first, last in standing_stretches(track)]
     reports_positions = bool(np.ptp(track.poses[:, :2], axis=0).any())
+    if not reports_positions:
+        stuck = stuck_headings(track.with_poses(np.column_stack([path[:, :2], track.poses[:, 2]])))
+        if stuck:
+            return [of_stuck(*one) for one in stuck]
     if not stretches or (not reports_positions and len(stretches) > _STRAIGHT):
         return []
     times, apart = _pairs(scans)

@@ -163,6 +163,14 @@ def test_a_heading_that_stands_is_stuck_where_headings_are_measured(measured):
     assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * measured
 
 
+@pytest.mark.parametrize("moves", [True, False])
+def test_a_compass_alone_is_stuck_where_its_heading_stands_and_the_vehicle_goes_on(moves):
+    noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
+    frozen = broken.odometry_freezes(broken.with_compass_error(WHOLE.without_positions(), noise), MIDDLE, 40.0)
+    causes = standing_causes([], frozen.track, moves * WHOLE.track.poses)
+    assert [cause.text for cause in causes] == ["the compass stuck for 40 s"] * moves
+
+
 @pytest.mark.parametrize("noise", [0.0, 0.02])
 def test_an_odometry_without_steps_stays_as_it_is(noise):
     poses = WHOLE.track.poses + noise * np.random.RandomState(0).normal(size=WHOLE.track.poses.shape)
@@ -196,7 +204,7 @@ def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said)
 def test_nothing_is_named_where_nothing_is_wrong():
     assert found_in(WHOLE).causes == []
     assert beam_causes(WHOLE.beams) == []
-    assert standing_causes(scans_in(WHOLE), WHOLE.track) == []
+    assert standing_causes(scans_in(WHOLE), WHOLE.track, WHOLE.track.poses) == []
 
 
 @pytest.mark.parametrize(
@@ -217,11 +225,11 @@ def test_beams_show_what_is_wrong_with_the_sonar(recording, said, after):
 
 def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehicle_stands():
     frozen = broken.odometry_freezes(WHOLE, MIDDLE, 60.0)
-    (cause,) = standing_causes(scans_in(frozen), frozen.track)
+    (cause,) = standing_causes(scans_in(frozen), frozen.track, WHOLE.track.poses)
     assert cause.text.startswith("odometry frozen for 60 s while the echoes move")
     still = [scan for scan in scans_in(WHOLE)[:1] for _ in range(5)]
     stands = Track(WHOLE.track.times, np.zeros_like(WHOLE.track.poses))
-    assert standing_causes(still, stands) == []
+    assert standing_causes(still, stands, stands.poses) == []
 
 
 @pytest.mark.parametrize("fault", [lambda one: broken.mount_turned(one, 120.0), broken.mount_upside_down])

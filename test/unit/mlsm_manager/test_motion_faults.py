@@ -22,6 +22,7 @@ CIRCLE = MotionFault(FaultKind.CIRCLE, np.nan, (0.02, 0.1, -0.05, 0.03))
 LENGTH = MotionFault(FaultKind.LENGTH, np.nan, (0.1,))
 DISTANCES = MotionFault(FaultKind.DISTANCES, START + 100.0, (-0.4,))
 CARRIED = MotionFault(FaultKind.CARRIED, START + 100.0, (0.3, 0.4), START + 120.0)
+STUCK = MotionFault(FaultKind.STUCK, START + 100.0, (0.5,), START + 120.0)
 
 
 @pytest.mark.parametrize("fault", [DRIFT, STEP, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
@@ -44,6 +45,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (LENGTH, "reported distances are 0.90 times the true ones"),
         (DISTANCES, "reported distances are 1.49 times the true ones"),
         (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
+        (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
     ],
 )
 def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
@@ -75,6 +77,25 @@ def test_a_path_is_fitted_without_the_fault(halved):
 def test_a_current_moves_what_comes_after_it():
     moved = (CARRIED.mended(WHOLE.track).poses - WHOLE.track.poses)[:, :2]
     np.testing.assert_allclose(moved[[0, -1]], [[0.0, 0.0], [6.0, 8.0]])
+
+
+def test_a_heading_that_stuck_turns_evenly_meanwhile():
+    turned = np.interp(
+        [99.0, 110.0, 121.0], WHOLE.track.times - START, (STUCK.mended(WHOLE.track).poses - WHOLE.track.poses)[:, 2]
+    )
+    np.testing.assert_allclose(turned, [0.0, 0.25, 0.5])
+
+
+@pytest.mark.long
+@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
+def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed():
+    noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
+    alone = broken.with_compass_error(WHOLE.without_positions(), noise)
+    found = mapped_as(broken.odometry_freezes(alone, MIDDLE, 40.0), "--refine")
+    assert_named_first(found.findings, "the compass stuck for 40 s and missed ")
+    whole = WHOLE.track.at(found.run.times)[:, :2]
+    apart = np.hypot(*(found.run.best[:, :2] - whole - found.run.best[0, :2] + whole[0]).T)
+    assert apart.mean() < 1.0  # m
 
 
 @pytest.mark.long

@@ -1,5 +1,6 @@
 """Odometry models: derivatives, what they expect, and that they use of the odometry only what they say."""
 
+from dataclasses import replace
 from functools import lru_cache
 
 import numpy as np
@@ -228,10 +229,17 @@ def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
     assert batch.steps < 15
 
 
+def test_a_compass_tells_no_turns_while_it_is_stuck():
+    times = 14.0 * np.arange(5)
+    stuck, usual = (compass.change(times) for compass in (replace(COMPASS, stuck=((20.0, 35.0),)), COMPASS))
+    np.testing.assert_array_equal(stuck.kept, usual.kept)
+    np.testing.assert_allclose(np.sqrt(stuck.variance - usual.variance), 0.22 * np.sqrt([0.0, 8.0, 7.0, 0.0]))
+
+
 def test_a_compass_that_errs_by_the_heading_is_an_unknown_that_is_eliminated():
-    nodes, durations = np.arange(10), np.full(9, 14.0)
+    nodes, times = np.arange(10), 14.0 * np.arange(10)
     yaws, layout = np.random.RandomState(1).uniform(-3.0, 3.0, 10), Layout(0, 9, 3)
-    change, columns = COMPASS.change(durations), layout.node_start(nodes) + YAW
+    change, columns = COMPASS.change(times), layout.node_start(nodes) + YAW
     errors = COMPASS.heading_deviation * harmonics(yaws) * [5.0, 5.0, 1.0, 1.0]
     with_errors, without = NormalEquations(layout.size + 4), NormalEquations(layout.size)
     for equations, count in ((with_errors, 4), (without, 0)):
@@ -246,6 +254,6 @@ def test_a_compass_that_errs_by_the_heading_is_an_unknown_that_is_eliminated():
         unknowns = np.arange(layout.size + count)
         told = np.where(unknowns < layout.size, 0.03, 1.0)  # by the echoes, and of errors of one beforehand
         equations.add_prior(unknowns, np.zeros(len(unknowns)), np.zeros(len(unknowns)), told)
-    found = by_heading(COMPASS, layout, yaws, durations, solution_of(without).solve)
+    found = by_heading(COMPASS, layout, yaws, times, solution_of(without).solve)
     covariance = np.linalg.inv(with_errors.dense()[0])[: layout.size, : layout.size]
     np.testing.assert_allclose(np.linalg.inv(without.dense()[0]) + found @ found.T, covariance, atol=1e-9)
