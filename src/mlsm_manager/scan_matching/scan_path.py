@@ -73,7 +73,7 @@ class PlanarMotion:
         heading = turn + self._middle_heading()
         along = self._seconds[:, np.newaxis] * np.column_stack([np.cos(heading), np.sin(heading)])
         scaled = rotated(self._step, turn + theta[DIRECTION])
-        columns = {
+        changes = {
             YAW: steps,
             RATE_X: along,
             RATE_Y: _quarter_turn(along),
@@ -82,8 +82,8 @@ class PlanarMotion:
             DIRECTION: (1.0 + theta[SCALE]) * _quarter_turn(scaled),
         }
         result = np.zeros((len(self.beam_times), 3, STATES))
-        for column, change in columns.items():
-            result[:, POSITION, column] = rotated(_sum_to_end(change), theta[YAW])
+        moves = rotated(_sum_to_end(np.array([*changes.values()])), theta[YAW])
+        result[:, POSITION, [*changes]] = moves.transpose(1, 2, 0)
         result[:, POSITION, YAW] = _quarter_turn(result[:, POSITION, YAW])
         result[:, X, X] = result[:, Y, Y] = result[:, YAW, YAW] = 1.0
         result[:, YAW, RATE_YAW] = self._tau
@@ -144,9 +144,9 @@ class PlanarMotion:
 
 
 def _sum_to_end(steps: np.ndarray) -> np.ndarray:
-    """Return (b, 2): minus the sum of the steps (b - 1, 2) from each node to the last one."""
-    result = np.zeros((len(steps) + 1, 2))
-    result[:-1] = -np.cumsum(steps[::-1], axis=0)[::-1]
+    """Return (..., b, 2): minus the sum of the steps (..., b - 1, 2) from each node to the last one."""
+    result = np.zeros((*steps.shape[:-2], steps.shape[-2] + 1, 2))
+    result[..., :-1, :] = -np.cumsum(steps[..., ::-1, :], axis=-2)[..., ::-1, :]
     return result
 
 
