@@ -34,6 +34,8 @@ from node_support.geometry import composed, inverse
 _JUMP_BACK = 30.0
 # s: by more an odometry that goes on leaps only where its clock does.
 _LEAP = 600.0
+# s: two playbacks of a recording begin within a turn or two of the head.
+_SAME_BEGIN = 60.0
 # s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
 # that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
@@ -84,6 +86,7 @@ class Localiser:
         """What is known between scans."""
         self._newest: Deque[Scan] = deque(maxlen=_NEWEST)
         self._search = PlaceSearch()
+        self._began = np.inf
         self.origin: Optional[Origin] = None
         """Where the map lies on the Earth, where that is known."""
         self.use(settings)
@@ -141,6 +144,7 @@ class Localiser:
         with self._lock:
             self.notice_time(scan.reference_time)
             self.changes += 1
+            self._began = min(self._began, scan.start)
             reported, scan = scan, self.following.taken(scan)
             self._newest.append(scan)
             update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
@@ -183,9 +187,8 @@ class Localiser:
         """Return by how many seconds `time` jumped back, 0 when it did not; the place is forgotten when it did.
 
         odometry: T_odom_base (3,) of that time, where `time` is its own. Where it goes on as if nothing had happened
-        only the clock jumped, back or far forward, and the vehicle is expected where it was. Otherwise a recording
-        began again, which is expected to have begun in odom's origin, or odometry is missing: three scans that do not
-        fit there tell, and then the whole map is searched.
+        only the clock jumped, back or far forward, and the vehicle is expected where it was. A recording that is played
+        again begins where it began before; otherwise the vehicle may be anywhere, and the whole map is searched.
         """
         until = self.believed_until
         if until is None or until - _JUMP_BACK <= time <= until + _LEAP:
@@ -195,12 +198,10 @@ class Localiser:
             if time > until and not goes_on:
                 return 0.0
             place = StoredPlace(self.last_correction, self.estimator.belief)
-            if not goes_on:
-                place = StoredPlace(np.zeros(3), belief_at(time, np.zeros(3), self.estimator.errors))
             self._forget_place()
-            if goes_on or self._search.is_known:
+            if goes_on:
                 self._expect(place.correction, place.widened)
-            else:
+            elif not self._search.is_known or abs(time - self._began) > _SAME_BEGIN:
                 self._search.lose()
         return until - time
 
@@ -277,6 +278,11 @@ class Localiser:
         return self._search.is_lost and self.estimator.matching
 
     @property
+    def is_expected(self) -> bool:
+        """Whether the next scans are searched about where the vehicle is expected."""
+        return self._search.may_be_near
+
+    @property
     def blocks(self) -> Blocks:
         """A copy of the map that is shown and saved."""
         return self._copied(Layer.SHOWN)
@@ -350,7 +356,7 @@ class Localiser:
         with self._lock:
             count = self.block_count
             self.changes += 1
-            self.origin = None
+            self.origin, self._began = None, np.inf
             self.estimator.clear()
             self._forget_scans()
             self._search.forget()

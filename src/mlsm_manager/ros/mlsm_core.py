@@ -258,8 +258,14 @@ class MlsmCore:
         if seconds:
             self._odometry.clear()
             self._z_down, self.status.verdicts = ZDownSigns(), ()
-            place = "where it was" if np.any(self._localiser.last_correction) else "where odom's origin is map's"
-            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, the vehicle is expected {place}")
+            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, {self._place_after_jump()}")
+
+    def _place_after_jump(self) -> str:
+        if self._localiser.is_lost:
+            return "the whole map is searched for the vehicle; call ~reset_map where another recording began"
+        if self._localiser.is_expected:
+            return "the vehicle is expected where it was"
+        return "the position in it starts at odom's again"
 
     def _after_replacing(self) -> None:
         self.status.verdicts = ()

@@ -322,14 +322,21 @@ def test_where_somebody_points_at_the_vehicle_it_is_searched():
 def test_after_a_jump_in_time_and_of_the_odometry_the_vehicle_is_found_in_its_map_and_nothing_is_mapped_twice():
     localiser, _ = localiser_after(9)
     before, shift = {tuple(cell) for cell in localiser.blocks.cells.tolist()}, np.array([12.0, -9.0, 0.4])
-    localiser.notice_time(0.0)
+    localiser.notice_time(-3600.0)
     tracks = [Track(scan.track.times, composed(shift, scan.track.poses)) for scan in SCANS[3:9]]
     again = [replace(scan, points=transformed(shift, scan.points), track=track)
              for scan, track in zip(SCANS[3:9], tracks)]  # fmt: skip
     updates = [localiser.take_scan(scan).scan for scan in again]
-    assert [update.accepted for update in updates] == [False] * 4 + [True] * 2
+    assert [update.accepted for update in updates] == [False] + [True] * 5
     assert np.hypot(*(updates[-1].belief.theta[:2] - SCANS[8].reference_pose[:2])) < 0.5
     assert sum(tuple(cell) not in before for cell in localiser.blocks.cells.tolist()) < 0.2 * len(before)
+
+
+def test_a_recording_that_is_played_again_begins_where_it_began():
+    localiser, _ = localiser_after(6)
+    localiser.notice_time(1.0)
+    assert not localiser.is_lost
+    np.testing.assert_array_equal(localiser.last_correction, np.zeros(3))
 
 
 def test_nothing_is_told_of_a_position_before_the_first_fix():
