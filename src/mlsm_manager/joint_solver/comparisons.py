@@ -99,6 +99,11 @@ def met_with(
     return [(each, sources, targets) for each, targets in zip(pairs, sets)]
 
 
+def weighted(pairs: Pairs, factors: np.ndarray) -> Pairs:
+    """Return comparisons with their importance times the factor of their neighbour; factors: (k,)."""
+    return pairs._replace(importance=pairs.importance * factors[pairs.neighbours])
+
+
 def add_comparisons(
     equations: NormalEquations, layout: Layout, met: Iterable[Comparison], parameters: SolverParameters, cut: float
 ) -> int:
@@ -187,7 +192,7 @@ class PostComparisons:
         if self._lists is None:
             self._lists = Neighbours(points, self._parameters.group_scans)
         near = _NEAR_IN_TIME * self._parameters.parts_per_turn
-        pairs = post_pairs(self._lists, sources, points, cut, near).weighted(self._importance)
+        pairs = weighted(post_pairs(self._lists, sources, points, cut, near), self._importance)
         return add_comparisons(equations, layout, along_and_across(pairs, sources, points), self._parameters, cut)
 
 

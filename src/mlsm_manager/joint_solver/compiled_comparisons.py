@@ -22,10 +22,6 @@ class Pairs(NamedTuple):
     neighbours: np.ndarray
     importance: np.ndarray
 
-    def weighted(self, factors: np.ndarray) -> "Pairs":
-        """Return the comparisons with their importance times the factor of their neighbour; factors: (k,)."""
-        return self._replace(importance=self.importance * factors[self.neighbours])
-
 
 class Surfaces(NamedTuple):
     """What n points lie on: normals (n, 2), and how well they are known (n,)."""

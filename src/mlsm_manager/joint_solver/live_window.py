@@ -12,6 +12,7 @@ from mlsm_manager.joint_solver.comparisons import (
     add_comparisons,
     met_with,
     support,
+    weighted,
 )
 from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.loops import Bend, add_loops
@@ -265,7 +266,7 @@ class LiveWindow:
             met.insert(1, (to_known, sources, known))
         self._met = self._run.submaps.within(met)
         to_frozen, *others = self._met
-        return [(to_frozen[0].weighted(self._frozen.importance), *to_frozen[1:]), *others]
+        return [(weighted(to_frozen[0], self._frozen.importance), *to_frozen[1:]), *others]
 
     def _move(self, step: np.ndarray) -> None:
         run_start = self._layout.run_start

@@ -21,12 +21,10 @@ from mlsm_manager.localisation.joint_session import (
     update_of,
 )
 from mlsm_manager.localisation.keyframe_map import MapSettings
-from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
+from mlsm_manager.scan_matching.scan import Matcher, MatchResult, ReportedMotion, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
@@ -232,7 +230,7 @@ class Joint(Estimator):
         if other is None:
             return
         self._motion.learn(scan.track)
-        wanted = other if self._motion.kind is OdometryKind.HEADING else self._usual
+        wanted = other if self._motion.only_turns else self._usual
         if wanted.parameters is self.parameters:
             return
         if wanted is self._usual and session is not None and session.solver.log.scan_count > _SCANS_BEFORE_VELOCITIES:

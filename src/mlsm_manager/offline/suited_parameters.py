@@ -7,10 +7,9 @@ import numpy as np
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
-from mlsm_manager.localisation.reported_motion import ReportedMotion
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import ReportedMotion, Scan
 from mlsm_manager.self_check.map_checks import scans_go_on
 from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts
 
@@ -80,10 +79,10 @@ def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:
     motion = ReportedMotion()
     motion.learn(recording.track)
     if motion.has_positions:
-        return OdometryFound(motion.kind, f"positions change by up to {motion.extent:.1f} m")
+        return OdometryFound(OdometryKind.AUTO, f"positions change by up to {motion.extent:.1f} m")
     if motion.has_headings:
         turned = np.degrees(motion.turned)
-        return OdometryFound(motion.kind, f"the position never changes, the heading by {turned:.0f} degrees")
+        return OdometryFound(OdometryKind.HEADING, f"the position never changes, the heading by {turned:.0f} degrees")
     return _without_motion(sweep_shifts(placed.beam for placed in recording.beams), standing)
 
 
