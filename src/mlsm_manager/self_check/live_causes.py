@@ -89,11 +89,12 @@ class LiveCauses:
 
     def covariance(self, steps: Sequence[Step]) -> np.ndarray:
         """Return what the causes add to the covariance (2, 2) [m^2] of the newest place."""
-        causes = self.causes(steps)
         with self._lock:
-            places, spread = np.array(self._places if causes else []), self._spread
-        if not len(places):
-            return spread
+            spread = self._spread
+            if not self._places or not (steps or self._found):
+                return spread
+            places = np.array(self._places)
+        causes = self.causes(steps)
         return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
 
 
