@@ -102,7 +102,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
         with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
             settings = parameters.map_settings()
             suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
-            refined = refine(replayed, recording.track, settings, suspected, bar.update)
+            refined = refine(replayed, recording.track, settings, [*found.suspected, *suspected], bar.update)
     runs = _runs(replayed, refined)
     if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, runs, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"

@@ -27,10 +27,14 @@ TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 
 
 class EchoFindings(NamedTuple):
-    """causes: that are named. mount: the likeliest mount, where one is named; else that of tf."""
+    """causes: that are named. mount: the likeliest mount, where one is named; else that of tf.
+
+    suspected: faults that pairs of scans alone do not tell, beside a compass alone.
+    """
 
     causes: List[Cause]
     mount: Hypothesis
+    suspected: Sequence[MotionFault] = ()
 
 
 def echo_findings(
@@ -41,8 +45,10 @@ def echo_findings(
     sonar_in_base: (2,) m. corrections: T_map_odom over time as a solver found it; None before there is one.
     """
     pairs = ScanPairs(scans, sonar_in_base, corrections)
-    if not pairs.tell or not _reports_positions(scans):
+    if not pairs.tell:
         return EchoFindings([], AS_TOLD)
+    if not _reports_positions(scans):
+        return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
     honest, best, tried = pairs.honest, *_turned(pairs)
     nats = pairs.evidence(best, honest) - np.log(tried)
     if nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD):
@@ -105,9 +111,36 @@ def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     return [Cause(fault.text, nats, metres=size, fault=fault)]
 
 
+class _Changed(NamedTuple):
+    """change: the likeliest of those that were tried from the scan of `begin` [s] on. nats: over that there is none."""
+
+    change: Change
+    begin: float
+    nats: float
+
+
 def _changed(pairs: ScanPairs) -> List[Cause]:
     """Return whether scans lie turned, or larger or smaller, on those before a moment, and not on those after it."""
-    near, found, changes = pairs.near(), [], [*_SLIPS, *_RANGES]
+    found = [
+        _of_change(one.change, one.begin, one.nats, pairs.typical_range())
+        for one in _likely_changes(pairs, [*_SLIPS, *_RANGES], AS_TOLD)
+        if one.nats > _NATS and (one.change.ranges != 1.0 or abs(one.change.turn) > _SLIP_TOLD)
+    ]
+    return ranked(found)[:1]
+
+
+def _suspected_slip(pairs: ScanPairs) -> List[MotionFault]:
+    """Return the likeliest slip of the head as the vehicle went by the solver, whose path gave way to it."""
+    found = [one for one in _likely_changes(pairs, _SLIPS, pairs.honest) if one.change.turn]
+    best = max(found, key=lambda one: one.nats, default=None)
+    return [] if best is None else [MotionFault(FaultKind.SLIP, best.begin, (best.change.turn,))]
+
+
+def _likely_changes(
+    pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis
+) -> List[_Changed]:  # fmt: skip
+    """Return the likeliest of `changes` from each scan on from which scans lie farther from those before."""
+    near, found = pairs.near(), []
     for number, begin in enumerate(near.begins):
         across, before = (near.pairs[:, 0] < number) & (near.pairs[:, 1] >= number), near.pairs[:, 1] < number
         if across.sum() < _FEWEST_SLIPPED or before.sum() < _FEWEST_BEFORE:
@@ -115,13 +148,12 @@ def _changed(pairs: ScanPairs) -> List[Cause]:
         apart, alike = near.distances[across], near.distances[before]
         if apart.mean() < _FARTHER * alike.mean():
             continue
-        table = pairs.changed(near.pairs[across], changes)
+        table = pairs.changed(near.pairs[across], changes, base)
         row = int(table.mean(axis=1).argmin())
         nats = evidence_of(apart, table[row], len(np.unique(near.pairs[across, 1])), alike)
         nats -= np.log(len(near.begins) * len(changes))
-        if nats > _NATS and (changes[row].ranges != 1.0 or abs(changes[row].turn) > _SLIP_TOLD):
-            found.append(_of_change(changes[row], float(begin), nats, pairs.typical_range()))
-    return ranked(found)[:1]
+        found.append(_Changed(changes[row], float(begin), nats))
+    return found
 
 
 def _of_change(change: Change, begin: float, nats: float, usual: float) -> Cause:

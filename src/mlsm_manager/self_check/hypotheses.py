@@ -100,11 +100,13 @@ class ScanPairs:
     def _placed(self, heard: _Heard, hypothesis: Hypothesis) -> np.ndarray:
         signs = np.array([1.0, -1.0 if hypothesis.is_over else 1.0])
         mount = np.array([self._sonar[0] + hypothesis.ahead, self._sonar[1] + hypothesis.aside, hypothesis.turn])
-        times = heard.times + hypothesis.delay
-        poses = heard.track.at(times) * [hypothesis.scale, hypothesis.scale, 1.0]
-        if hypothesis.as_solved:
-            poses = composed(self._corrections.at(times), poses)
-        return transformed(composed(poses, mount), heard.points * signs)
+        return transformed(composed(self._poses(heard.track, heard.times, hypothesis), mount), heard.points * signs)
+
+    def _poses(self, track: Track, times: np.ndarray, hypothesis: Hypothesis) -> np.ndarray:
+        """Return where the vehicle was when beams came with the stamps `times` (n,) [s]."""
+        times = times + hypothesis.delay
+        poses = track.at(times) * [hypothesis.scale, hypothesis.scale, 1.0]
+        return composed(self._corrections.at(times), poses) if hypothesis.as_solved else poses
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
         """Return the hypothesis under which scans lie closest."""
@@ -145,13 +147,17 @@ class ScanPairs:
             return velocity
         return rotated(velocity[np.newaxis], -self._corrections.at(np.array([time]))[:, 2])[0]
 
-    def changed(self, pairs: np.ndarray, changes: Sequence["Change"]) -> np.ndarray:
-        """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) has each of `changes` (k)."""
+    def changed(self, pairs: np.ndarray, changes: Sequence["Change"], base: Hypothesis = AS_TOLD) -> np.ndarray:
+        """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) has each of `changes` (k).
+
+        base: what is right besides.
+        """
         table = np.empty((len(changes), len(pairs)))
         for column, (one, other) in enumerate(pairs):
-            tree, later = cKDTree(self._placed(self._heard[one], AS_TOLD)), self._heard[other]
-            centre, factors = later.track.at(later.times[-1])[:2], {change.ranges for change in changes}
-            late = {one: self._placed(later._replace(points=one * later.points), AS_TOLD) - centre for one in factors}
+            tree, later = cKDTree(self._placed(self._heard[one], base)), self._heard[other]
+            centre = self._poses(later.track, later.times[-1:], base)[0, :2]
+            factors = {change.ranges for change in changes}
+            late = {one: self._placed(later._replace(points=one * later.points), base) - centre for one in factors}
             for row, (turn, ranges) in enumerate(changes):
                 turns = np.full(len(later.times), turn)
                 table[row, column] = _apart(tree, rotated(late[ranges], turns) + centre)

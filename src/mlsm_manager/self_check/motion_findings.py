@@ -19,7 +19,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
     likeliest,
     likelihood_across,
 )
-from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, MotionFault, likely_faults
+from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import CERTAIN, Cause, Fault, is_same
 from mlsm_manager.self_check.course import LARGEST, course_causes, course_of
@@ -32,7 +32,8 @@ from node_support.geometry import composed, inverse, rotated, transformed
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 _NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
-_NATS_ALONE = 15.0  # of ranges that change beside a compass alone: when, how much and how fast it went are all unknown
+_NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
+_SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
 _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
@@ -170,7 +171,7 @@ def motion_findings(
         if len(found.causes) == _FAULTS or not faults:
             break
         best = _best(found, faults)
-        needed = _NATS_ALONE if found.is_alone and best.fault.kind is SonarKind.RANGES else _NATS
+        needed = _NATS_ALONE if found.is_alone and best.fault.kind in _SUDDEN else _NATS
         if best.gain < needed or not best.fault.is_beyond(errors.times[-1]):
             break
         found = _without(found, best)
@@ -258,23 +259,16 @@ def _beside(fault: Fault) -> List[Fault]:
 
 
 def _tried(found: MotionFindings, fault: Fault) -> _Trial:
-    if fault.kind is FaultKind.STUCK:
-        return _tried_turn(found, fault)
     if isinstance(fault, SonarFault):
         run, fit = fit_without(found.run, fault)
         return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
-    track = fault.mended(found.track)
+    track, run = fault.mended(found.track), found.run
+    if fault.kind is FaultKind.STUCK:  # how the vehicle turned meanwhile the echoes tell
+        model = run.odometry.stuck(fault.begin, fault.end)
+        run = replace(run, parameters=replace(run.parameters, odometry=model))
     span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
-    run = replace(found.run, log=found.run.log.since(0, OdometryLog.of(track)))
-    fit = fit_with(found.run, track, span)
-    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood)
-
-
-def _tried_turn(found: MotionFindings, fault: MotionFault) -> _Trial:
-    """Return the trial of a turn that a stuck compass missed; when the vehicle turned meanwhile the echoes tell."""
-    track, model = fault.mended(found.track), found.run.odometry.stuck(fault.begin, fault.end)
-    run = replace(found.run, parameters=replace(found.run.parameters, odometry=model))
-    fit = fit_turned(run, track)
+    turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)
+    fit = fit_turned(run, track) if turns else fit_with(run, track, span)
     run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
     return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood)
 

@@ -9,8 +9,12 @@ from made_recordings import SECONDS, touring
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
+from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
+from mlsm_manager.self_check.echo_causes import echo_findings
+from node_support.geometry import composed, inverse
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 WHOLE, MIDDLE = touring(), SECONDS / 2.0
 START = WHOLE.track.times[0]
@@ -63,6 +67,12 @@ def assert_named_first(findings, said):
     assert findings.trust.line.startswith("trust: DOUBTFUL")
 
 
+def off(found):
+    """Return how far (m,) [m] a mapped path is from the one that the vehicle went, if both begin at one place."""
+    whole = WHOLE.track.at(found.run.times)[:, :2]
+    return np.hypot(*(found.run.best[:, :2] - whole - found.run.best[0, :2] + whole[0]).T)
+
+
 @pytest.mark.long
 def test_distances_that_change_are_named_first(halved):
     assert_named_first(halved.findings, "reported distances are 0.")
@@ -93,9 +103,26 @@ def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed()
     alone = broken.with_compass_error(WHOLE.without_positions(), noise)
     found = mapped_as(broken.odometry_freezes(alone, MIDDLE, 40.0), "--refine")
     assert_named_first(found.findings, "the compass stuck for 40 s and missed ")
-    whole = WHOLE.track.at(found.run.times)[:, :2]
-    apart = np.hypot(*(found.run.best[:, :2] - whole - found.run.best[0, :2] + whole[0]).T)
-    assert apart.mean() < 1.0  # m
+    assert off(found).mean() < 1.0  # m
+
+
+@pytest.mark.parametrize("degrees", [0.0, 25.0])
+def test_a_slip_of_the_head_is_suspected_beside_a_compass_alone_where_scans_lie_turned_as_the_vehicle_went(degrees):
+    alone = broken.head_slips(WHOLE.without_positions(), MIDDLE, degrees)
+    went = composed(WHOLE.track.poses, inverse(alone.track.poses))
+    scans = [scan for scan, _ in scans_of(alone, EchoExtractor(EchoExtractorParameters()))]
+    found = echo_findings(scans, alone.sonar_in_base, Track(WHOLE.track.times, went))
+    assert found.causes == []
+    assert [round(-np.degrees(slip.sizes[0]) / 4.0) for slip in found.suspected] == [6] * bool(degrees)
+    np.testing.assert_allclose([slip.begin - START for slip in found.suspected], MIDDLE, atol=10.0)
+
+
+@pytest.mark.long
+@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
+def test_a_slip_of_the_head_beside_a_compass_alone_is_named_and_the_path_fitted_without_it():
+    found = mapped_as(broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0), "--refine")
+    assert_named_first(found.findings, "the head slipped by 2")
+    assert off(found).mean() < 1.0  # m
 
 
 @pytest.mark.long
