@@ -39,6 +39,7 @@ _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspe
 _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
 _ROUNDS = 2
 _TURNED = np.radians(15.0)  # between turns that are tried of a vehicle whose compass stuck: scans then still meet
+_NATS_TURNED = 15.0  # by which one must be likelier than none: in a marina a wrong one of 24 was so by 4 nats
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
 _GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
 _FAULTS = 3  # at most, one after the other
@@ -139,7 +140,7 @@ class MotionFindings:
 
 
 class _Trial(NamedTuple):
-    """gain: of log likelihood, over the run as it was found before."""
+    """gain: of log likelihood, over the run as it was found before, and over what a turn needs that nobody reported."""
 
     fault: Fault
     run: Solution
@@ -161,7 +162,7 @@ def motion_findings(
     if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not _tells(track):
         return found
     first = places = _places(run)
-    suspected = [one for fault in suspected for one in _possible(fault)]
+    suspected = [one for fault in suspected if not _is_missed_turn(fault, suspected) for one in _possible(fault)]
     for _ in range(_FAULTS + 1):
         errors = freed_errors(found.run)
         if errors is None:
@@ -244,7 +245,13 @@ def _possible(fault: Fault) -> List[Fault]:
     """Return what a suspected fault may be: nobody tells how far a vehicle turned while its compass stuck."""
     if fault.kind is not FaultKind.STUCK:
         return [fault]
-    return [replace(fault, sizes=(float(turn),)) for turn in np.arange(-np.pi, np.pi, _TURNED)]
+    return [replace(fault, sizes=(turn,)) for turn in (_TURNED * np.arange(-12, 12)).tolist()]
+
+
+def _is_missed_turn(fault: Fault, suspected: Sequence[Fault]) -> bool:
+    """Return whether a slip is suspected of the head while the compass stuck: the vehicle turned."""
+    stuck = [one for one in suspected if one.kind is FaultKind.STUCK]
+    return fault.kind is FaultKind.SLIP and any(one.begin <= fault.begin <= one.end for one in stuck)
 
 
 def _beside(fault: Fault) -> List[Fault]:
@@ -270,7 +277,8 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)
     fit = fit_turned(run, track) if turns else fit_with(run, track, span)
     run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
-    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood)
+    needed = _NATS_TURNED if fault.kind is FaultKind.STUCK and fault.sizes[0] else 0.0
+    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood - needed)
 
 
 def _gained(found: MotionFindings, fault: SonarFault, run: Solution, fit: BatchResult) -> float:

@@ -1,5 +1,7 @@
 """What is wrong with an odometry all along is found from what echoes correct of it, named, and taken out."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
@@ -50,6 +52,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (DISTANCES, "reported distances are 1.49 times the true ones"),
         (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
         (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
+        (replace(STUCK, sizes=(0.0,)), "the compass stuck for 20 s,"),
     ],
 )
 def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
