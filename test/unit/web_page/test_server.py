@@ -66,7 +66,12 @@ def test_no_file_from_outside_of_its_folder_is_given(site, path):
 
 def test_nothing_can_be_posted(site):
     assert site.get("/", "POST", b"x")[0].status == 405
-    assert site.get("/", "POST", b"x" * 10_000)[0].status in (400, 405, 413)
+    try:
+        status = site.get("/", "POST", b"x" * 10_000)[0].status
+    except ConnectionError:
+        # It does not read a long message to its end, and closes the connection: the answer may be lost.
+        return
+    assert status in (400, 405, 413)
 
 
 def test_a_page_gets_what_is_new_and_may_set_a_mark(site):
