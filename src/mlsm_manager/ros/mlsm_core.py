@@ -246,12 +246,15 @@ class MlsmCore:
         rospy.loginfo("%s: the vehicle is expected at x %.1f m, y %.1f m", self.health.name, *pose[:2])
 
     def _notice_time_of_scan(self, time: float) -> None:
-        """Notice that time jumped back; while the odometry goes on, an old scan is merely late."""
-        newest = self._odometry.newest()
-        if newest is None or newest[0] is None or newest[0] < time:
-            self._notice_time(time)
+        """Notice that time jumped back; while the odometry goes on, an old scan is merely late.
+
+        Where odometry never changes, and so has no time, the vehicle is still there.
+        """
+        newest_time, T_odom_base = self._odometry.newest() or (-np.inf, None)
+        if newest_time is None or newest_time >= time:
+            self._notice_time(time if newest_time is None else newest_time, planar(T_odom_base))
         else:
-            self._notice_time(newest[0], planar(newest[1]))
+            self._notice_time(time)
 
     def _notice_time(self, time: float, odometry: Optional[np.ndarray] = None) -> None:
         seconds = self._localiser.notice_time(time, odometry)

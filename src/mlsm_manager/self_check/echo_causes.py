@@ -136,9 +136,7 @@ def _suspected_slip(pairs: ScanPairs) -> List[MotionFault]:
     return [] if best is None else [MotionFault(FaultKind.SLIP, best.begin, (best.change.turn,))]
 
 
-def _likely_changes(
-    pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis
-) -> List[_Changed]:  # fmt: skip
+def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis) -> List[_Changed]:
     """Return the likeliest of `changes` from each scan on from which scans lie farther from those before."""
     near, found = pairs.near(), []
     for number, begin in enumerate(near.begins):

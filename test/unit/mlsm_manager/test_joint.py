@@ -301,6 +301,17 @@ def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
         assert np.hypot(*(found.belief.theta[:2] - later.reference_pose[:2])) < 0.5
 
 
+def test_a_vehicle_that_stands_is_expected_where_it_was_when_its_clock_is_set_back():
+    localiser, scan = localiser_after(0)[0], SCANS[0]
+    still = Track(scan.track.times, np.tile(scan.track.poses[-1], (len(scan.track.times), 1)))
+    for seconds in (0.0, 20.0, 40.0):
+        track = Track(still.times + seconds, still.poses)
+        localiser.take_scan(replace(scan, times=scan.times + seconds, track=track,
+                                    reference_time=scan.reference_time + seconds))  # fmt: skip
+    assert localiser.notice_time(-3600.0, still.poses[-1]) > 0.0
+    assert (localiser.is_expected, localiser.is_lost) == (True, False)
+
+
 def test_an_hour_in_which_the_vehicle_went_elsewhere_is_no_jump_of_the_clock():
     localiser, _ = localiser_after(3)
     localiser.following.correction(SCANS[2].reference_time, SCANS[2].reference_pose)
