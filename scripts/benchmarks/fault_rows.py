@@ -128,7 +128,7 @@ ROWS = (
     FaultRow("compass {} deg off, positions right", rare.compass_off, _TURNED, "degrees", 60.0),
     FaultRow("mount tilted {} deg", rare.mount_tilted, "is tilted", "degrees", 20.0),
     FaultRow("head loses {} deg each minute", rare.head_loses_steps, f"{_SLIPPED}|{_DRIFTS}", "degrees", 3.0),
-    FaultRow("head's angles tremble by {} deg", rare.head_trembles, "", "degrees", 6.0),
+    FaultRow("head's angles tremble by {} deg", rare.head_trembles, "angles tremble", "degrees", 6.0),
     FaultRow("stamps tremble by {} s", rare.stamps_jitter, "", "seconds", 0.5),
     FaultRow("sound {} times as fast", rare.sound_faster, "", "factor", 1.05, True),
     FaultRow("ranges {} m too long", rare.ranges_offset, "", "metres", 1.0),

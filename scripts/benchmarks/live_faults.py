@@ -17,6 +17,7 @@ from benchmarks.faults import fault_parser, source
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
+from mlsm_manager.offline.bag_mapping import with_steady_head
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan_path import POSITION
@@ -43,6 +44,7 @@ class Told(NamedTuple):
 def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
     """Return what the live nodes tell of a recording, scan by scan, once there is a fix."""
     localiser = parameters.build_localiser(recording.sonar_in_base)
+    recording, _ = with_steady_head(recording)
     beams = recording.corrected(parameters.part(BeamCorrection))
     found = []
     for scan, _ in scans_of(beams, EchoExtractor(parameters.echoes())):

@@ -31,7 +31,7 @@ from mlsm_manager.offline.suited_parameters import (
     with_odometry,
 )
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.self_check.beam_causes import beam_causes
+from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
 from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck, ranked
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, turn_text
@@ -43,9 +43,11 @@ from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.beams.parameters import BeamCorrection
+from sonar_processing.beams.steady_head import steadied
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
+_MOSTLY = 0.9  # share of the beams whose angles are mended: then those of the head are
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
 
 
@@ -79,7 +81,8 @@ class MappedBag:
 def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
-    return _mapped(recording, causes, _odometry(recording, options), options)
+    recording, trembling = with_steady_head(recording)
+    return _mapped(recording, [*causes, *trembling], _odometry(recording, options), options)
 
 
 def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, options: Namespace) -> MappedBag:
@@ -296,6 +299,15 @@ def _run(
     paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
     further = [path for path in paths if len(path.times)]
     return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, trust, further)
+
+
+def with_steady_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
+    """Return a recording whose head's angles do not tremble, and what was wrong with it."""
+    found = steadied([placed.beam for placed in recording.beams])
+    if found is None:
+        return recording, []
+    beams = [replace(placed, beam=beam) for placed, beam in zip(recording.beams, found.beams)]
+    return replace(recording, beams=beams), [of_trembling(np.degrees(found.deviation), found.share > _MOSTLY)]
 
 
 def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:

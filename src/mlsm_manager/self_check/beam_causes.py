@@ -26,6 +26,11 @@ _NEAREST = 1.0 / 3.0  # of the range, from which on echoes are compared with tho
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle, which nothing corrects while the head stands
 
 
+def of_trembling(degrees: float, is_mended: bool) -> Cause:
+    """Return the cause for a head whose reported angles tremble; is_mended: whether they are those of its turn now."""
+    return Cause(f"the head's angles tremble by {degrees:.0f} deg", _CERTAIN, is_mended=is_mended, metres=0.5)
+
+
 def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
     """Return what the beams of a recording, in the order of their stamps, show."""
     if len(beams) < 2:

@@ -2,6 +2,7 @@
 
 from typing import Callable
 
+import numpy as np
 import rospy
 from sensor_msgs.msg import LaserScan
 
@@ -11,13 +12,14 @@ from node_support.ros.callbacks import MessageClasses, guarded
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_types import BEAM_TYPES, LASER_SCAN, UNLIKELY
 from sonar_processing.beams.reader import BeamMessageParameters, BeamReader, Reading, beam_type
+from sonar_processing.beams.steady_head import SteadyHead
 from underwater_map_construction.msg import SonarScanLine
 
 _BUFFER_BYTES = 2**20  # thousands of beams: what comes while the process stands still for some seconds
 
 
 class BeamSubscriber:
-    """Calls back with every beam, in whichever of the known types it comes."""
+    """Calls back with every beam, in whichever of the known types it comes; angles that tremble are made steady."""
 
     def __init__(
         self,
@@ -34,6 +36,7 @@ class BeamSubscriber:
         self._health = health
         self._on_new_unit, self._on_message = on_new_unit, on_message
         self._reader = BeamReader(parameters)
+        self._head = SteadyHead()
         self._classes = MessageClasses((SonarScanLine, LaserScan))
         self._subscriber = rospy.Subscriber(
             topics.BEAMS,
@@ -59,7 +62,8 @@ class BeamSubscriber:
         self._health.count("beams in", len(reading.beams))
         self._on_message(len(reading.beams))
         for beam in reading.beams:
-            self._take(beam)
+            for steady in self._head.add(beam):
+                self._take(steady)
 
     def _tell(self, kind: str, reading: Reading) -> None:
         for note in reading.notes:
@@ -72,7 +76,11 @@ class BeamSubscriber:
             )
         if reading.unit_changed:
             self._health.problem("changes of the unit of angles", "the unfinished scan is forgotten; set angle_unit")
+            self._head = SteadyHead()
             self._on_new_unit()
+        if self._head.trembles:
+            told = f"by {np.degrees(self._head.deviation):.0f} deg; those of a steady turn are taken instead"
+            self._health.problem("beams of which the head's angles tremble", told, len(reading.beams))
 
 
 def _topics_instead() -> str:

@@ -14,7 +14,7 @@ from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
-from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended
+from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended, with_steady_head
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Track
@@ -221,6 +221,17 @@ def test_beams_show_what_is_wrong_with_the_sonar(recording, said, after):
     (cause,) = beam_causes(recording.beams)
     assert cause.text.startswith(said)
     np.testing.assert_allclose(cause.begin - START, after, atol=12.0)
+
+
+def test_a_head_whose_angles_tremble_is_named_and_turns_steadily_afterwards():
+    steady, (cause,) = with_steady_head(rare.head_trembles(WHOLE, 6.0))
+    assert cause.text == "the head's angles tremble by 6 deg"
+    assert cause.is_mended
+    assert len(scans_in(steady)) == len(scans_in(WHOLE))
+
+
+def test_a_head_whose_angles_do_not_tremble_is_left_as_it_is():
+    assert with_steady_head(WHOLE) == (WHOLE, [])
 
 
 def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehicle_stands():
