@@ -19,35 +19,49 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.fault_rows import faults
-from benchmarks.harness import benchmark_parser, compass_alone, mapped_as, marina
+from benchmarks.harness import WHOLE_MARINA, benchmark_parser, compass_alone, mapped_as, marina, recorded
 from benchmarks.tours import simulated
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.findings import Trust
-from mlsm_manager.offline.recording import Recording, track_between
+from mlsm_manager.offline.recording import Recording, read_recording, track_between
 from mlsm_manager.offline.run_files import position_error
 from mlsm_manager.scan_matching.scan import Track
 from recordings.bags.bag import RecordingError
+from recordings.reader import Request
 
 _COVERS, _MOSTLY = 2.5, 0.95  # stated deviations, which are to hold so large a share of the path
-SOURCES = ("marina", "harbour", "marina compass", "harbour compass")
+_TOURS = {"harbour": "harbour_ahead", "basin": "basin_ahead", "turning": "harbour_turning"}
 _COMPASS = " compass"
+_USUAL = ["marina", "harbour"]
+SOURCES = [name + form for form in ("", _COMPASS) for name in ("marina", "canal", *_TOURS)]
 
 
 @lru_cache(maxsize=None)
 def source(name: str, seconds: float) -> Recording:
-    """Return the beginning of an unbroken recording."""
+    """Return the beginning of an unbroken recording; of the canal the end, which is beyond the marina's first part."""
     if name.endswith(_COMPASS):
         return compass_alone(source(name[: -len(_COMPASS)], seconds))
     if name == "marina":
         return shortened(marina(), seconds)
-    return shortened(simulated("harbour_ahead_tour").with_dvl(1), seconds)
+    if name == "canal":
+        return ending(read_recording(recorded(WHOLE_MARINA), Request()), seconds)
+    return shortened(simulated(f"{_TOURS[name]}_tour").with_dvl(1), seconds)
 
 
 def shortened(recording: Recording, seconds: float) -> Recording:
     """Return the first seconds of a recording."""
-    end = recording.track.times[0] + seconds
-    track = track_between(recording.track, recording.track.times[0], end)
-    beams = [placed for placed in recording.beams if placed.beam.stamp_ns * 1e-9 < track.times[-1]]
+    return _between(recording, recording.track.times[0], recording.track.times[0] + seconds)
+
+
+def ending(recording: Recording, seconds: float) -> Recording:
+    """Return the last seconds of a recording."""
+    return _between(recording, recording.track.times[-1] - seconds, recording.track.times[-1])
+
+
+def _between(recording: Recording, begin: float, end: float) -> Recording:
+    track = track_between(recording.track, begin, end)
+    first, last = track.times[[0, -1]]
+    beams = [placed for placed in recording.beams if first <= placed.beam.stamp_ns * 1e-9 < last]
     return replace(recording, beams=beams, track=track)
 
 
@@ -111,7 +125,7 @@ def fault_parser(name: str, about: str) -> ArgumentParser:
     """Return a parser of a study that breaks recordings."""
     parser = benchmark_parser(name, about)
     parser.add_argument("--rows", default=".", metavar="REGEX", help="which ones, of 'SOURCE: FAULT'; default: all")
-    parser.add_argument("--sources", nargs="+", default=SOURCES[:2], choices=SOURCES, help="default: %(default)s")
+    parser.add_argument("--sources", nargs="+", default=_USUAL, choices=SOURCES, help="default: %(default)s")
     parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
     parser.add_argument("--seed", type=int, help="of other sizes and times than the usual ones")
     return parser

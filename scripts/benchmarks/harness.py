@@ -22,7 +22,7 @@ from recordings.reader import Request, read
 from sonar_processing.beams.beam import Beam
 
 ROOT = Path(__file__).resolve().parents[2]
-MARINA = "marina_first.bag"
+MARINA, WHOLE_MARINA = "marina_first.bag", "marina_whole_blind.bag"
 Row = Tuple[str, str, str]
 """What was measured, the figure with its unit, and what is wanted of it."""
 

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Callable, Dict, List, Set
 
 from benchmarks.faults import shortened
-from benchmarks.harness import benchmark_parser, mapped_as, recorded
+from benchmarks.harness import MARINA, WHOLE_MARINA, benchmark_parser, mapped_as, recorded
 from benchmarks.live_faults import told_by
 from benchmarks.tours import simulated
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -21,8 +21,8 @@ from recordings.bags.bag import RecordingError
 from recordings.reader import Request
 
 _BAGS = (
-    "micron_static.bag", "micron_scanline.bag", "tritech_micron_native.bag", "marina_first.bag", "marina_first_dvl.bag",
-    "marina_whole_blind.bag",
+    "micron_static.bag", "micron_scanline.bag", "tritech_micron_native.bag", MARINA, "marina_first_dvl.bag",
+    WHOLE_MARINA,
 )  # fmt: skip
 _TOURS = ("harbour", "harbour_ahead", "basin", "basin_ahead", "harbour_turning")
 _ERRORS = {"usual errors": {}, "current of 0.1 m/s": {"current": 0.1}, "compass drifts": {"heading_walk": 0.001}}

@@ -4,14 +4,13 @@ from typing import List
 
 import numpy as np
 
-from benchmarks.harness import Row, cpu_seconds, mapped, missing_row, recorded
+from benchmarks.harness import MARINA, WHOLE_MARINA, Row, cpu_seconds, mapped, missing_row, recorded
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
-WHOLE, PART = "marina_whole_blind.bag", "marina_first.bag"
 _WANTED = {"": 500, "--refine": 150, "--refine --check": 150}
 """Times real time that are wanted, by the options."""
 _WARM_UP = 10
@@ -20,24 +19,27 @@ _WARM_UP = 10
 
 def rows() -> List[Row]:
     """Return CPU time and times real time for each set of options."""
-    bag, found = recorded(WHOLE), []
+    bag, found = recorded(WHOLE_MARINA), []
     if not bag.is_file():
-        return [missing_row(WHOLE)]
+        return [missing_row(WHOLE_MARINA)]
     for options, wanted in _WANTED.items():
         summary, cpu = mapped(bag, *options.split())
         speed = summary["times_real_time"] * summary["seconds"] / cpu
-        found.append((f"map_bag {WHOLE} {options}", f"{cpu:.1f} s CPU, {speed:.0f} times real time", f">= {wanted}"))
+        measured = f"{cpu:.1f} s CPU, {speed:.0f} times real time"
+        found.append((f"map_bag {WHOLE_MARINA} {options}", measured, f">= {wanted}"))
     return found
 
 
 def carving_rows() -> List[Row]:
     """Return the share of a scan's time that carving takes, with each estimator."""
-    return [_carving_row(estimator) for estimator in EstimatorName] if recorded(PART).is_file() else [missing_row(PART)]
+    if not recorded(MARINA).is_file():
+        return [missing_row(MARINA)]
+    return [_carving_row(estimator) for estimator in EstimatorName]
 
 
 def _carving_row(estimator: EstimatorName) -> Row:
-    options = map_bag_arguments([str(recorded(PART)), "--out", "nowhere", "--set", f"estimator={estimator.value}"])
-    recording = read_recording(recorded(PART), options.request)
+    options = map_bag_arguments([str(recorded(MARINA)), "--out", "nowhere", "--set", f"estimator={estimator.value}"])
+    recording = read_recording(recorded(MARINA), options.request)
     parameters = with_odometry(options.parameters, odometry_of(recording).kind, options.fixed)
     carving, plain = (
         parameters.changed({"carve": carve}).build_localiser(recording.sonar_in_base) for carve in (True, False)
