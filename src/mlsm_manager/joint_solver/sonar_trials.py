@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import List, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -162,6 +162,14 @@ def likelihood_across(run: Solution, fit: BatchResult, fault: SonarFault) -> flo
         run.parameters, echo_deviation=closer * run.parameters.echo_deviation, cut=closer * run.parameters.cut
     )
     return likelihood_of(replace(run, parameters=parameters, state=fit.state), fault.begin)
+
+
+def ranges_changed_at(begins: Sequence[float], size: float) -> List[SonarFault]:
+    """Return changes of the range setting at each of `begins` [s] by `size`, the logarithm of true ranges over reported
+    ones; none where no setting is so large.
+    """
+    faults = [SonarFault(SonarKind.RANGES, begin, (size,)) for begin in begins]
+    return [fault for fault in faults if fault.is_possible]
 
 
 def changed_ranges(run: Solution) -> List[SonarFault]:

@@ -18,6 +18,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
     fit_without,
     likeliest,
     likelihood_across,
+    ranges_changed_at,
 )
 from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -205,7 +206,7 @@ def _likely(errors: OdometryErrors) -> List[Fault]:
     changed = next(one for one in found if one.kind is FaultKind.DISTANCES)
     number = int(np.searchsorted(errors.times, changed.begin))
     begins = errors.times[max(number - _EARLIER, 1) : number + _LATER]
-    return [*found, *(SonarFault(SonarKind.RANGES, begin, changed.times(-1.0).sizes) for begin in begins.tolist())]
+    return [*found, *ranges_changed_at(begins.tolist(), -changed.sizes[0])]
 
 
 def _of_sonar(found: MotionFindings) -> List[SonarFault]:

@@ -7,7 +7,7 @@ from benchmarks.harness import mapped_as
 from benchmarks.rare_faults import mount_tilted
 from made_recordings import SECONDS, touring
 
-from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
+from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, ranges_changed_at
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 WHOLE, MIDDLE = touring(), SECONDS / 2.0
@@ -44,6 +44,11 @@ def test_points_lie_where_they_would_without_the_fault(fault, places):
     points = np.array([[4.0, 4.0, 0.0, 1.0], [6.0, 1.0, 0.0, 1.0]])
     moved = fault.placed(Scan(points, np.array([1.0, 2.0]), np.zeros(2, dtype=bool), track, 2.0), SONAR_IN_BASE)
     np.testing.assert_allclose(moved.points[:, :2], places, atol=1e-9)
+
+
+@pytest.mark.parametrize(("size", "tried"), [(np.log(2.0), 2), (np.log(30.0), 0)])
+def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
+    assert len(ranges_changed_at([1.0, 2.0], size)) == tried
 
 
 @pytest.mark.long
