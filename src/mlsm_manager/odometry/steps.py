@@ -131,9 +131,7 @@ class ContinuousOdometry:
                     self._bridge(track, stalled[number])
                 else:
                     self._leave_out(track, number)
-        oldest = int(np.searchsorted(track.times, track.times[-1] - max(_LONGEST_STALLS.values()) - _BEFORE))
-        newest = slice(min(oldest, max(len(track.times) - _AROUND, 0)), None)
-        self._newest = track.chosen(newest)
+        self._newest = track.chosen(slice(min(_oldest_that_tells(track), max(len(track.times) - _AROUND, 0)), None))
         self._known = True
 
     def _stood_until(self, before: float, after: float) -> bool:
@@ -205,6 +203,14 @@ class ContinuousOdometry:
         return mended.chosen(~within)
 
 
+def _oldest_that_tells(track: Track) -> int:
+    """Return from which pose on a track tells whether its end is a stall, and how the vehicle went just before."""
+    stands = np.flatnonzero(_moves(track))[-1:] + 1
+    begin = track.times[stands[0]] if stands.size else track.times[0]
+    longest = track.times[-1] - max(_LONGEST_STALLS.values())
+    return int(np.searchsorted(track.times, max(begin, longest) - _BEFORE))
+
+
 class Stall(NamedTuple):
     """begin, end: of the poses, the first that stood and the first after it. missed, usual: (3,) in base_link, how the
     vehicle went meanwhile, and in a step as long as the last one, if it went on as before. kind: STALLED where the
@@ -222,10 +228,15 @@ def stalls(track: Track) -> List[Stall]:
     """Return where the position stood for seconds, though no vehicle stops and starts so suddenly; without positions,
     where the heading did.
     """
-    moves = np.diff(track.poses, axis=0) != 0.0
-    same = stretches(~(moves[:, :2] if moves[:, :2].any() else moves[:, 2:]).any(axis=1))
+    same = stretches(~_moves(track))
     found = (_stall(track, first, last) for first, last in same if last + 1 < len(track.times))
     return [stall for stall in found if stall is not None]
+
+
+def _moves(track: Track) -> np.ndarray:
+    """Return which steps (m - 1,) change the position; without positions, which ones change the heading."""
+    moves = np.diff(track.poses, axis=0) != 0.0
+    return (moves[:, :2] if moves[:, :2].any() else moves[:, 2:]).any(axis=1)
 
 
 def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
@@ -292,6 +303,8 @@ def impossible_steps(track: Track, limits: MotionLimits) -> np.ndarray:
     durations = np.diff(track.times)[:, np.newaxis]
     moves = np.diff(track.poses, axis=0)
     steps = np.column_stack([np.hypot(*moves[:, :2].T), np.abs(wrapped(moves[:, 2]))])
+    if not (steps > LEAST_STEP).any():
+        return np.empty(0, dtype=int)
     speeds = steps / durations
     beside = np.maximum(np.roll(speeds, 1, axis=0), np.roll(speeds, -1, axis=0))
     beside[0], beside[-1] = speeds[min(1, len(speeds) - 1)], np.inf
