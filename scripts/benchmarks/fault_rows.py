@@ -54,6 +54,7 @@ def _other(row: FaultRow, factor: float) -> float:
 _JUMPED, _STEPPED, _SLIPPED = "odometry jumped", "compass stepped", "head slipped|compass stepped"
 _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", "compass drifts"
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
+_MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"
 _OFTEN = {"at": 60.0, "every": 60.0}
 
@@ -74,8 +75,8 @@ ROWS = (
     FaultRow("odometry {} times as long", broken.odometry_scaled, _LENGTHS, "factor", 0.9, True),
     FaultRow("odometry {} times as long", broken.odometry_scaled, _LENGTHS, "factor", 1.1, True),
     FaultRow("odometry {} times as long from then on", broken.odometry_scaled, _LENGTHS, "factor", 0.5, True, True),
-    FaultRow("DVL turned {} deg", broken.dvl_turned, _TURNED, "degrees", 10.0),
-    FaultRow("DVL turned {} deg", broken.dvl_turned, _TURNED, "degrees", 30.0),
+    FaultRow("DVL turned {} deg", broken.dvl_turned, _MOVES, "degrees", 10.0),
+    FaultRow("DVL turned {} deg", broken.dvl_turned, _MOVES, "degrees", 30.0),
     FaultRow("compass steps {} deg", broken.compass_steps, _STEPPED, "degrees", 20.0, begins=True),
     FaultRow("compass steps {} deg, positions right", broken.compass_steps, _STEPPED, "degrees", 20.0, begins=True,
              others={"positions_follow": False}),
@@ -122,10 +123,10 @@ ROWS = (
     FaultRow("odometry counts z down", rare.odometry_mirrored, _OVER),
     FaultRow("odometry in feet", partial(broken.odometry_scaled, factor=3.28), _LENGTHS),
     FaultRow("odometry {} s late", rare.odometry_late, _STAMPS, "seconds", 3.0),
-    FaultRow("x and y of the DVL swapped", rare.positions_swapped, _TURNED),
+    FaultRow("x and y of the DVL swapped", rare.positions_swapped, _MOVES),
     FaultRow("compass sticks", rare.compass_sticks, "compass stuck", begins=True),
     FaultRow("compass trembles by {} deg", rare.compass_noisy, "compass trembles", "degrees", 5.0),
-    FaultRow("compass {} deg off, positions right", rare.compass_off, _TURNED, "degrees", 60.0),
+    FaultRow("compass {} deg off, positions right", rare.compass_off, _MOVES, "degrees", 60.0),
     FaultRow("mount tilted {} deg", rare.mount_tilted, "is tilted", "degrees", 20.0),
     FaultRow("head loses {} deg each minute", rare.head_loses_steps, f"{_SLIPPED}|{_DRIFTS}", "degrees", 3.0),
     FaultRow("head's angles tremble by {} deg", rare.head_trembles, "angles tremble", "degrees", 6.0),

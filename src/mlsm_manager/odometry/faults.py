@@ -7,7 +7,7 @@ from typing import Callable, Dict, List, Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, harmonics, inverse
+from node_support.geometry import composed, harmonics, inverse, rotated
 
 # rad and relative: a marina's unbroken compass errs by 3 degrees with the heading, a DVL by three times 1 percent.
 _USUAL_HEADING, _USUAL_LENGTH = np.radians(4.0), 0.04
@@ -107,6 +107,13 @@ def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
     moves = (steps[:, 0] + 1j * steps[:, 1]) * np.exp(1j * yaws[:-1])
     places = complex(*start[:2]) + np.append(0.0, np.cumsum(moves))
     return np.column_stack([places.real, places.imag, yaws])
+
+
+def with_moves_turned(track: Track, turn: float) -> Track:
+    """Return a track whose moves are turned by `turn` [rad] against the vehicle, whose headings stay."""
+    steps = composed(inverse(track.poses[:-1]), track.poses[1:])
+    steps[:, :2] = rotated(steps[:, :2], np.full(len(steps), turn))
+    return track.with_poses(integrated(track.poses[0], steps))
 
 
 def _after(times: np.ndarray, _: np.ndarray, begin: float) -> np.ndarray:

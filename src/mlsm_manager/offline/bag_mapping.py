@@ -14,6 +14,7 @@ from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind, strafes
+from mlsm_manager.odometry.faults import with_moves_turned
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings, Trust
@@ -34,7 +35,8 @@ from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
 from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck, ranked
 from mlsm_manager.self_check.companions import without_companions
-from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, turn_text
+from mlsm_manager.self_check.course import moves_are_turned
+from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, of_turned_moves, turn_text
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.motion_findings import goes_on_with_other_ranges
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -98,6 +100,10 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
     found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
+    if _moves_are_turned(recording, found, options):
+        recording = recording.with_track(with_moves_turned(recording.track, -found.mount.turn))
+        cause = of_turned_moves(found.mount.turn)
+        return _mapped(recording, [*causes, cause], odometry._replace(moves_turned=True), options)
     of_echoes = [*mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
     refined, refitted = None, []
@@ -173,6 +179,12 @@ def _positions_mislead(
         return False
     alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
     return goes_on_better(believed[-1], alone.solver.solution)
+
+
+def _moves_are_turned(recording: Recording, found: EchoFindings, options: Namespace) -> bool:
+    """Return whether the odometry's moves are turned, not the sonar, unless a turned sonar is to be put right."""
+    seems_turned = found.mount.turn != 0.0 and not found.mount.is_over and not options.fix_mount
+    return seems_turned and moves_are_turned(recording.track, found.mount.turn)
 
 
 def _runs(replayed: Replayed, refined: Optional[Refined]) -> List[Solution]:

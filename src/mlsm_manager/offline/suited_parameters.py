@@ -48,13 +48,14 @@ _WITHOUT_MOTION: Dict[Optional[SweepMotion], Dict[str, float]] = {
 class OdometryFound(NamedTuple):
     """kind: of the odometry. reason: one line that says why. motion: what sweeps tell where nothing was recorded.
 
-    is_said: somebody says that the vehicle stood still.
+    is_said: somebody says that the vehicle stood still. moves_turned: whether its moves were turned, by the echoes.
     """
 
     kind: OdometryKind
     reason: str
     motion: Optional[SweepMotion] = None
     is_said: bool = False
+    moves_turned: bool = False
 
     @property
     def name(self) -> str:
@@ -67,6 +68,8 @@ class OdometryFound(NamedTuple):
     @property
     def assumed(self) -> str:
         """What the path rests on though nothing was measured of it; empty where something was."""
+        if self.moves_turned:
+            return "the odometry's direction of motion is as the echoes tell it, if the compass is right"
         untold = "the vehicle is held still, and nothing tells whether it was"
         return untold if self.motion is SweepMotion.UNTOLD else ""
 

@@ -12,6 +12,7 @@ _SECONDS, _GONE = 10.0, 1.0  # s of a stretch, and m in it from which on it has 
 _FEWEST = 10  # stretches
 _AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
 _STRAFES = np.radians(20.0)  # deviation of the course, beyond which the vehicle has no usual one; ahead: 5 to 13 deg
+_ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
 _NAMED = 2.0  # deviations
 LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes back
 
@@ -52,6 +53,15 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     if spread > _STRAFES or abs(middle) > largest:
         return NOT_TOLD
     return CourseFound(-middle, float(np.hypot(1.25 * spread / np.sqrt(len(angles)), _AHEAD)))
+
+
+def moves_are_turned(reported: Track, turn: float) -> bool:
+    """Return whether a sonar that seems turned by `turn` [rad] is not, but the moves of the odometry are.
+
+    So it is if these go aside, by the odometry itself, about as far: most vehicles go where their heading points.
+    """
+    aside = -course_of(reported, np.pi).turn
+    return bool(abs(wrapped(aside - turn)) < _ASIDE * abs(aside))
 
 
 def course_causes(found: CourseFound) -> List[Cause]:

@@ -8,7 +8,7 @@ from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
-from mlsm_manager.self_check.causes import Cause, ranked
+from mlsm_manager.self_check.causes import CERTAIN, Cause, ranked
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
@@ -16,6 +16,7 @@ _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
 _DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
 _SLIP_TOLD = np.radians(12.0)  # three deviations of a compass that turns quickly, or in a gap of the odometry
+_SWAPPED = np.radians(30.0)  # from 90 deg: a vehicle that goes ahead does not tell such a turn from x for y
 _SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0, 4.0))]
 _RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-5.0, 6.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
@@ -81,6 +82,19 @@ def turn_text(found: Hypothesis) -> str:
         "the sonar is upside down, or its head turns the other way than its driver says, or the odometry counts z down"
     )
     return side if abs(turn) < np.degrees(_TURN_TOLD) else f"{side}; it is {angle} besides"
+
+
+def of_turned_moves(turn: float) -> Cause:
+    """Return the cause for an odometry whose moves were turned by `turn` [rad], and are put right.
+
+    Where it is the compass that is off, beside positions that are right, the path is turned by as much.
+    """
+    angle = f"{np.degrees(turn):.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg"
+    text = f"the odometry's direction of motion is turned by {angle} against the vehicle"
+    if abs(abs(turn) - np.pi / 2.0) < _SWAPPED:
+        text += ", or its x and y are swapped"
+    text += ", or the compass is off"
+    return Cause(text, CERTAIN, is_mended=True, turn=abs(turn))
 
 
 def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:

@@ -250,6 +250,15 @@ def test_a_mount_that_is_put_right_has_no_cause_left(fault):
     assert found_in(recording.mounted(mount.turn, mount.is_over)).causes == []
 
 
+def test_moves_that_go_as_far_aside_as_the_sonar_seems_turned_are_put_right_and_no_check_is_fine():
+    whole, options = shortened(WHOLE, 200.0), map_bag_arguments(["recording", "--out", "nowhere"])
+    found, right = mapped_bag(rare.positions_swapped(whole), options), mapped_bag(whole, options)
+    trust = found.findings.trust
+    assert "mended: the odometry's direction of motion is turned by " in trust.line
+    assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
+    assert np.hypot(*(found.run.best - right.run.best)[:, :2].T).max() < 1.5
+
+
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
     options = map_bag_arguments(["recording", "--out", "nowhere", "--fix-mount"])
     trust = mapped_bag(broken.mount_turned(shortened(WHOLE, 200.0), 120.0), options).findings.trust
