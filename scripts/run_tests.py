@@ -33,7 +33,8 @@ LONG = (
     "one_and_many_processes", "every_node", "vehicle_emulated", "silence", "thrusters_demo", "strafing_demo",
     "unaided_demo",
 )  # fmt: skip
-# Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds.
+# Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds:
+# steps that others run beside do without.
 IN_PARALLEL = ("-n", str(os.cpu_count() or 1), "--dist", "loadfile")
 _PRINTING = threading.Lock()
 
@@ -129,7 +130,7 @@ def oldest_versions() -> List[Step]:
         print(f"       left out: oldest versions: {HOW_TO_GET_ONE}", flush=True)
         return []
     report = RESULTS / "oldest.xml"
-    command = ["python3", "scripts/oldest/run.py", *IN_PARALLEL, f"--junitxml={report}"]
+    command = ["python3", "scripts/oldest/run.py", f"--junitxml={report}"]
     return [Step("oldest versions", command, report, Load.SPARE, SPARE_TIMEOUT)]
 
 

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.newest_only("about the text of the sources")
+
 SOURCES = Path(__file__).resolve().parents[2] / "src"
 ALLOWED = {
     "node_support": set(),

@@ -66,21 +66,21 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
     good, same, bad = ROOT / "test/data/basin.bag", tmp_path / "basin.bag", tmp_path / "bad.bag"
     shutil.copy(good, same)
     bad.write_bytes(b"no bag")
-    out = tmp_path / "maps"
-    first = map_each([good, bad, same], out, [], scheduler)
-    assert [bool(outcome.summary) for outcome in first] == [True, False, True]
+    out, recordings = tmp_path / "maps", [good, bad] if is_shared else [good, bad, same]
+    first = map_each(recordings, out, [], scheduler)
+    assert [bool(outcome.summary) for outcome in first] == [one is not bad for one in recordings]
     assert "not a bag, or damaged" in first[1].problem
-    assert first[0].summary["scans"] == first[2].summary["scans"]
-    assert (out / "basin_2/map.ply").is_file()
-    page = (out / INDEX).read_text()
-    assert page.count("<img") == 2
-    assert "2 of 3 recordings mapped" in page
+    assert is_shared or first[0].summary["scans"] == first[2].summary["scans"]
+    assert is_shared or (out / "basin_2/map.ply").is_file()
+    page, mapped = (out / INDEX).read_text(), len(recordings) - 1
+    assert page.count("<img") == mapped
+    assert f"{mapped} of {len(recordings)} recordings mapped" in page
     assert "not a bag, or damaged" in page
     written = (out / "basin/summary.json").stat().st_mtime_ns
-    again = map_each([good, bad, same], out, [], scheduler)
+    again = map_each(recordings, out, [], scheduler)
     assert again == first
     assert (out / "basin/summary.json").stat().st_mtime_ns == written
-    assert "3/3" in capsys.readouterr().out
+    assert f"{len(recordings)}/{len(recordings)}" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize(

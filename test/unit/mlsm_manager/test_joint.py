@@ -154,6 +154,7 @@ def without_positions(scan):
     return replace(scan, points=transformed(move, scan.points), track=track)
 
 
+@pytest.mark.newest_only("slow; the other tests follow vehicles with every version")
 def test_where_positions_never_change_the_compass_is_taken_for_all_there_is():
     found, named = (PARAMETERS.changed(values).build_localiser(SONAR_IN_BASE) for values in ({}, HEADING))
     for scan in SCANS:
@@ -286,6 +287,7 @@ def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes,
     assert all(doubt in position_state(place, False, False, doubts)[1] for doubt in said)
 
 
+@pytest.mark.newest_only("slow; the other tests follow vehicles with every version")
 def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
     for hour in (3600.0, -3600.0):
         localiser, _ = localiser_after(6)

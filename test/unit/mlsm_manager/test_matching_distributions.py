@@ -16,6 +16,8 @@ from mlsm_manager.scan_matching.judgement import agreement
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
 from mlsm_manager.scan_matching.scan import MatchStatus, corrected_points
 
+pytestmark = pytest.mark.newest_only("slow; scans are matched with every version by the tests of the localiser")
+
 FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 
 
@@ -263,7 +265,6 @@ def normalised_square(result, truth):
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("a statistic of many fixes; the tests below compute single ones")
 @pytest.mark.parametrize("noise", NOISES)
 def test_fixes_err_as_much_as_their_covariance_says_whatever_the_noise(noise):
     """Deviations at most 1.4 times too large, and not too small."""

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
+from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
-from made_recordings import SECONDS, touring
+from made_recordings import touring
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
@@ -18,9 +19,10 @@ from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import composed, inverse
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
-WHOLE, MIDDLE = touring(), SECONDS / 2.0
+TWICE_ROUND = touring()
+WHOLE, MIDDLE = shortened(TWICE_ROUND, 200.0), 100.0
 START = WHOLE.track.times[0]
-NODES = np.arange(START, START + SECONDS, 10.0)
+NODES = np.arange(START, TWICE_ROUND.track.times[-1], 10.0)
 
 DRIFT = MotionFault(FaultKind.DRIFT, START + 100.0, (-0.001,))
 STEP = MotionFault(FaultKind.STEP, START + 100.0, (0.2,))
@@ -33,11 +35,11 @@ STUCK = MotionFault(FaultKind.STUCK, START + 100.0, (0.5,), START + 120.0)
 
 @pytest.mark.parametrize("fault", [DRIFT, STEP, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
 def test_a_fault_is_found_from_what_mends_it(fault):
-    yaws = WHOLE.track.at(NODES)[:, 2]
-    mended = fault.mended(WHOLE.track)
+    track = TWICE_ROUND.track
+    yaws, mended = track.at(NODES)[:, 2], fault.mended(track)
     headings = mended.at(NODES)[:, 2] - yaws
-    lengths = np.hypot(*np.diff(mended.poses[:, :2], axis=0).T) / np.hypot(*np.diff(WHOLE.track.poses[:, :2], axis=0).T)
-    scales = np.interp(NODES, WHOLE.track.times[1:], lengths) - 1.0
+    lengths = np.hypot(*np.diff(mended.poses[:, :2], axis=0).T) / np.hypot(*np.diff(track.poses[:, :2], axis=0).T)
+    scales = np.interp(NODES, track.times[1:], lengths) - 1.0
     found = {one.kind: one for one in likely_faults(NODES, yaws, headings, scales)}[fault.kind]
     np.testing.assert_allclose(found.sizes, fault.sizes, atol=0.1 * np.abs(fault.sizes).max())
     np.testing.assert_allclose(found.begin, fault.begin, atol=10.0)
@@ -62,7 +64,7 @@ def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
 @pytest.fixture(scope="module")
 def halved():
     """Return what is found of an odometry that reports half of each distance from the middle on."""
-    return mapped_as(broken.odometry_scaled(WHOLE, 0.5, at=MIDDLE), "--refine")
+    return mapped_as(broken.odometry_scaled(TWICE_ROUND, 0.5, at=150.0), "--refine")
 
 
 def assert_named_first(findings, said):
@@ -83,7 +85,7 @@ def test_distances_that_change_are_named_first(halved):
 
 @pytest.mark.long
 def test_a_path_is_fitted_without_the_fault(halved):
-    apart = np.hypot(*(halved.run.best - WHOLE.track.at(halved.run.times))[:, :2].T)
+    apart = np.hypot(*(halved.run.best - TWICE_ROUND.track.at(halved.run.times))[:, :2].T)
     assert apart.mean() < 1.5  # m; 3 without
 
 
@@ -145,7 +147,7 @@ def test_what_echoes_correct_is_named_first(recording, said):
 @pytest.mark.long
 @pytest.mark.newest_only("slow; a run is mapped three times")
 def test_positions_that_go_elsewhere_are_left_out():
-    found = mapped_as(rare.odometry_drifts(WHOLE.without_positions(), 0.0, 0.1))
+    found = mapped_as(rare.odometry_drifts(TWICE_ROUND.without_positions(), 0.0, 0.1))
     assert found.odometry.kind is OdometryKind.HEADING
     assert "mended: reported positions do not go where the echoes tell" in found.findings.trust.line
 

@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.surface_points import Sights, SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; posts are compared with every version by other tests")]
 
 STRONG, WEAK = 100.0, 30.0
 WALL = np.column_stack([np.linspace(-10.0, 10.0, 41), np.full(41, 8.0)])
@@ -110,7 +110,6 @@ def test_speed_is_found_from_posts(with_posts):
     assert with_posts.estimates[-1].velocity[0] == pytest.approx(SPEED, abs=0.05)
 
 
-@pytest.mark.newest_only("slow; the tests above follow the same canal")
 @pytest.mark.parametrize("post_confidence", [0.0, 1.0])
 def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(post_confidence):
     """Nothing tells the way along it, so the deviation is that of a speed which nobody knows."""

@@ -3,14 +3,15 @@
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
+from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
 from benchmarks.rare_faults import mount_tilted
-from made_recordings import SECONDS, touring
+from made_recordings import touring
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, ranges_changed_at
 from mlsm_manager.scan_matching.scan import Scan, Track
 
-WHOLE, MIDDLE = touring(), SECONDS / 2.0
+WHOLE, MIDDLE = shortened(touring(), 200.0), 100.0
 COMPASS = WHOLE.without_positions()
 ARM = SonarFault(SonarKind.ARM, np.nan, (2.0, 1.0))
 TILT = SonarFault(SonarKind.TILT, np.nan, (0.1, 0.0))

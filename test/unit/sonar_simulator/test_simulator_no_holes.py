@@ -18,6 +18,8 @@ from sonar_simulator.simulation.sonar_head import SonarHead, SonarParameters
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_file import load_world
 
+pytestmark = pytest.mark.newest_only("slow; beams are simulated with every version")
+
 WORLDS = Path(__file__).resolve().parents[3] / "worlds"
 NOISE_FREE = {
     "laser_cone": {"spread": 0.0, "noise_echoes": 0},

@@ -8,6 +8,8 @@ from node_support.geometry import pose_matrix, yaw_of
 from sonar_simulator.simulation.odometry import Odometry, OdometryParameters
 from sonar_simulator.simulation.scripted_vehicle import VehicleScript, VehicleState
 
+pytestmark = pytest.mark.newest_only("slow; bags are simulated with every version")
+
 START = {"x": 10.0, "y": 5.0, "z": -2.0, "yaw_deg": 20.0}
 WAY = VehicleScript.from_yaml_data(
     [
@@ -71,7 +73,6 @@ def test_drift_and_scale_do_not_depend_on_how_often_odometry_is_asked():
     np.testing.assert_allclose(often[:2, 3], seldom[:2, 3], atol=0.1)
 
 
-@pytest.mark.newest_only("a statistic of many ways; the other tests compute single ones")
 def test_noise_grows_with_its_parameter_and_has_no_bias():
     def ends(noise):
         estimates = (_estimates(_odometry(seed, speed_noise=noise), 2.0)[-1] for seed in range(30))
@@ -83,7 +84,6 @@ def test_noise_grows_with_its_parameter_and_has_no_bias():
     assert np.abs(small.mean(axis=0)).max() < 3.0 * small.std() / math.sqrt(30)
 
 
-@pytest.mark.newest_only("a statistic of many ways; the other tests compute single ones")
 def test_the_noise_of_the_turn_rate_makes_the_heading_walk():
     ends = [yaw_of(_estimates(_odometry(seed, turn_rate_noise_deg=1.0), 2.0)[-1].T_odom_base) for seed in range(40)]
     errors = np.degrees(np.array(ends) - yaw_of(WAY.pose(WAY.duration)))
