@@ -1,7 +1,6 @@
 """scripts/soak: a mission of many hours through the live graph, and what grew in the course of it."""
 
 import argparse
-import math
 import os
 import shutil
 import signal
@@ -11,6 +10,7 @@ import time
 from pathlib import Path
 from typing import List
 
+import numpy as np
 import rospy
 import yaml
 from benchmarks.harness import print_table
@@ -65,8 +65,10 @@ def _laps(hours: float) -> str:
     """Return a script of moves, as YAML, that repeats the demo's tour for `hours` or a little longer."""
     script = yaml.safe_load((ROOT / "yaml/basin_tour.yaml").read_text())
     lap = [*script["moves"], _BACK]
-    seconds = sum(move.get("seconds", 0.0) + move.get("wait", 0.0) for move in lap)
-    return yaml.safe_dump({"start": script["start"], "moves": lap * math.ceil(3600.0 * hours / seconds)})
+    ends = np.cumsum([move.get("seconds", 0.0) + move.get("wait", 0.0) for move in lap])
+    laps, rest = divmod(3600.0 * hours, ends[-1])
+    moves = lap * int(laps) + lap[: int(np.searchsorted(ends, rest)) + 1]
+    return yaml.safe_dump({"start": script["start"], "moves": moves})
 
 
 def _sample_all(graph: Graph, listener: Listener, folder: Path, samples: List[Sample]) -> None:

@@ -1,4 +1,4 @@
-"""A lap of a long mission through the live graph: nothing is lost, flooded, or told wrongly."""
+"""The first minutes of a long mission through the live graph: nothing is lost, flooded, or told wrongly."""
 
 import os
 import subprocess
@@ -8,9 +8,9 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[2]
 
 
-def test_a_lap_of_ten_minutes_leaves_nothing_to_complain_of(tmp_path):
+def test_five_minutes_leave_nothing_to_complain_of(tmp_path):
     environment = {**os.environ, "PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}"}
-    command = [sys.executable, "-m", "soaking", "--hours", "0.15", "--output", str(tmp_path)]
+    command = [sys.executable, "-m", "soaking", "--hours", "0.08", "--output", str(tmp_path)]
     done = subprocess.run(
         command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False
     )
