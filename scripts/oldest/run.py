@@ -33,20 +33,12 @@ def _ros_folders() -> List[str]:
 
 
 def main(arguments: List[str]) -> int:
-    """Make the environment where it is missing and run pytest in it; return the exit status.
-
-    Loops are compiled first: else several processes of pytest would compile the same ones at the same time.
-    """
+    """Make the environment where it is missing and run pytest in it; return the exit status."""
     status = make()
     if status:
         return status
     pytest = ["-m", "pytest", "-p", "fewer_tests", "--hypothesis-profile=few", "-m", "not newest_only"]
-    return _run("scripts/compile_loops.py") or _run(*pytest, *arguments)
-
-
-def _run(*arguments: str) -> int:
-    """Run the environment's Python in the checkout; return its exit status."""
-    command = [str(ENVIRONMENT / "bin/python"), *arguments]
+    command = [str(ENVIRONMENT / "bin/python"), *pytest, *arguments]
     return subprocess.run(command, cwd=str(ROOT), env=variables(), check=False).returncode
 
 

@@ -1,12 +1,11 @@
 """Bags as the 2015 package recorded them: its messages differ from ours in the name of their package only."""
 
-from io import BytesIO
 from pathlib import Path
 from typing import Any, Dict
 
-import genpy
 import genpy.dynamic
 import rosbag
+from foreign_messages import serialised
 
 NEW_PACKAGE, OLD_PACKAGE = "underwater_map_construction", "avora_msgs"
 
@@ -15,13 +14,6 @@ def old_type(new_type: Any) -> Any:
     """Return the class that the 2015 package had for a message class of today."""
     name = new_type._type.replace(NEW_PACKAGE, OLD_PACKAGE)
     return genpy.dynamic.generate_dynamic(name, new_type._full_text)[name]
-
-
-def serialized(message: genpy.Message) -> bytes:
-    """Return the bytes of a message, as they are in a bag and on the wire."""
-    buffer = BytesIO()
-    message.serialize(buffer)
-    return buffer.getvalue()
 
 
 def with_old_types(source: Path, target: Path, beams: str = "/sonar/raw") -> None:
@@ -33,5 +25,5 @@ def with_old_types(source: Path, target: Path, beams: str = "/sonar/raw") -> Non
             if name.startswith(f"{NEW_PACKAGE}/"):
                 if name not in old_types:
                     old_types[name] = old_type(type(message))
-                message = old_types[name]().deserialize(serialized(message))
+                message = old_types[name]().deserialize(serialised(message))
             written.write(beams if topic == "/sonar/raw" else topic, message, time)

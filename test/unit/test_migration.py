@@ -8,7 +8,8 @@ import genpy
 import numpy as np
 import pytest
 import rosbag
-from old_bag import old_type, serialized
+from foreign_messages import serialised
+from old_bag import old_type
 
 from sonar_processing.ros.conversions import header, point_cloud
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
@@ -47,7 +48,7 @@ def old_bag(tmp_path_factory):
     path = tmp_path_factory.mktemp("bags") / "old.bag"
     with rosbag.Bag(str(path), "w") as bag:
         for second, (topic, message) in enumerate(_recorded()):
-            old = old_type(type(message))().deserialize(serialized(message))
+            old = old_type(type(message))().deserialize(serialised(message))
             bag.write(topic, old, START + genpy.Duration(second))
     return path
 
@@ -81,10 +82,10 @@ def test_the_old_types_are_those_that_the_rules_are_for(new_type):
 
 def test_every_message_comes_out_as_one_of_ours_with_its_bytes_topic_and_time(fixed):
     expected = [
-        (topic, message._type, message._md5sum, serialized(message), START + genpy.Duration(second))
+        (topic, message._type, message._md5sum, serialised(message), START + genpy.Duration(second))
         for second, (topic, message) in enumerate(_recorded())
     ]
-    assert expected == [(topic, one._type, one._md5sum, serialized(one), time) for topic, one, time in fixed]
+    assert expected == [(topic, one._type, one._md5sum, serialised(one), time) for topic, one, time in fixed]
 
 
 def test_the_package_exports_the_rules():

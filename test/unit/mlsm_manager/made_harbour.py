@@ -77,6 +77,11 @@ def reporting(scan: Scan, factor: float) -> Scan:
     return replace(scan, points=transformed(moves, scan.points), track=scaled)
 
 
+def without_positions(scan: Scan) -> Scan:
+    """Return a scan of a vehicle that reports its heading only."""
+    return reporting(scan, 0.0)
+
+
 def with_wild_odometry(scan: Scan) -> Scan:
     """Return a scan that leads to no solution."""
     poses = scan.track.poses.copy()

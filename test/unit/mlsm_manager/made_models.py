@@ -1,5 +1,6 @@
 """Motion models of small vehicles, and parameters of the joint solver with a DVL."""
 
+import numpy as np
 from made_harbour import SONAR_IN_BASE
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
@@ -45,6 +46,14 @@ def followed(scans, parameters=None, sonar_in_base=SONAR_IN_BASE):
     for scan in scans:
         solver.add(scan)
     return solver
+
+
+def errors_of(solver, made):
+    """Return by how much (n, 3) the live path is off the truth of a tour at the scans' ends, [m] and [rad]."""
+    ends = np.array([estimate.time for estimate in solver.estimates])
+    truth = made.truth.at(ends) - made.truth.at(0.0) * [1.0, 1.0, 0.0]
+    path = np.array([estimate.T_map_base for estimate in solver.estimates])
+    return path - solver.log.node_poses(np.array([0])) * [1.0, 1.0, 0.0] - truth
 
 
 def solution_of(log, odometry, state):

@@ -2,7 +2,18 @@
 
 import numpy as np
 import pytest
-from made_harbour import CANAL, HARBOUR, SONAR_IN_BASE, TURN, ahead, along_canal, deaf, selected, tour
+from made_harbour import (
+    CANAL,
+    HARBOUR,
+    SONAR_IN_BASE,
+    TURN,
+    ahead,
+    along_canal,
+    deaf,
+    selected,
+    tour,
+    without_positions,
+)
 from made_models import HEADING, solver_parameters
 
 from mlsm_manager.joint_solver.estimate import Turns
@@ -12,7 +23,6 @@ from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from mlsm_manager.scan_matching.scan import Scan, Track
 
 pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the search over places is tested with every version")]
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
@@ -23,21 +33,13 @@ PARAMETERS = solver_parameters(
 )
 
 
-def with_heading_only(scan):
-    """Return a scan of an odometry whose position stays at 0."""
-    poses = scan.track.poses * [0.0, 0.0, 1.0]
-    points = scan.points.copy()
-    points[:, :2] -= scan.track.at(scan.times)[:, :2]
-    return Scan(points, scan.times, scan.moving, Track(scan.track.times, poses), scan.reference_time)
-
-
 def run(path, corners, without):
     """Return the session after a tour of which the sonar heard nothing for a while, and the true path.
 
     without: makes of the scans in the silence what the session takes.
     """
     made = tour(END, path=path, corners=corners)
-    scans = [with_heading_only(scan) for scan in made.scans]
+    scans = [without_positions(scan) for scan in made.scans]
     session = JointSession.begun(PARAMETERS, SONAR_IN_BASE, np.zeros(3), None, np.empty((0, 2)))
     for scan in scans[:BEGIN] + without(scans[BEGIN : BEGIN + SILENT]) + scans[BEGIN + SILENT :]:
         session.add(scan)
@@ -93,7 +95,7 @@ def test_the_map_is_provisional_until_a_second_scan_agrees():
     session = JointSession.begun(PARAMETERS, SONAR_IN_BASE, np.zeros(3), None, np.empty((0, 2)))
     told = []
     for scan in tour(4, path=ahead).scans:
-        session.add(with_heading_only(scan))
+        session.add(without_positions(scan))
         told.append(session.is_provisional)
     assert told[0]
     assert not told[-1]
@@ -146,9 +148,9 @@ def run_in(known):
     first = made.truth.at(np.zeros(1))[0] * [1.0, 1.0, 0.0]
     session = JointSession.begun(PARAMETERS, SONAR_IN_BASE, first, np.array([0.3, 0.3, 0.02]), known)
     for scan in made.scans[:WEST]:
-        session.add(with_heading_only(selected(scan, scan.points[:, 0] < EDGE)))
+        session.add(without_positions(selected(scan, scan.points[:, 0] < EDGE)))
     for scan in made.scans[-EAST:]:
-        session.add(with_heading_only(selected(scan, scan.points[:, 0] > EDGE)))
+        session.add(without_positions(selected(scan, scan.points[:, 0] > EDGE)))
     return session, made.truth
 
 
@@ -197,7 +199,7 @@ class Carried:
     def take(self, scans):
         """Give scans, and clouds of the same echoes, to the localiser."""
         for scan in scans:
-            scan = with_heading_only(scan)
+            scan = without_positions(scan)
             self.localiser.take_scan(scan)
             self.localiser.take_cloud(MapCloud.of_scan(scan))
 

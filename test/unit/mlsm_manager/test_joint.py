@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, tour
+from made_harbour import SONAR_IN_BASE, tour, without_positions
 
 from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
@@ -14,7 +14,7 @@ from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Verdict
-from node_support.geometry import composed, inverse, transformed
+from node_support.geometry import composed, transformed
 from node_support.health import Health, Level
 
 SCANS = tour(12).scans
@@ -145,13 +145,6 @@ def test_a_stored_map_gives_its_free_space_back(run):
     other, _ = localiser_after(0)
     other.restore(stored, same_odometry=False)
     assert len(other.free) == len(localiser.free)
-
-
-def without_positions(scan):
-    """Return a scan of a vehicle that reports its heading only."""
-    track = Track(scan.track.times, scan.track.poses * [0.0, 0.0, 1.0])
-    move = composed(track.at(scan.times), inverse(scan.track.at(scan.times)))
-    return replace(scan, points=transformed(move, scan.points), track=track)
 
 
 @pytest.mark.newest_only("slow; the other tests follow vehicles with every version")

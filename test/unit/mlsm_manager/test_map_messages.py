@@ -2,7 +2,6 @@
 
 import sys
 from importlib.machinery import ModuleSpec
-from io import BytesIO
 from types import ModuleType
 from typing import NamedTuple, Tuple
 
@@ -10,6 +9,7 @@ import genpy
 import genpy.dynamic
 import numpy as np
 import pytest
+from foreign_messages import serialised
 from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
 from hypothesis import given
 from hypothesis import strategies as st
@@ -57,14 +57,8 @@ def boxes_by_list(blocks):
     ]
 
 
-def _bytes(message):
-    buff = BytesIO()
-    message.serialize(buff)
-    return buff.getvalue()
-
-
 def _read(message):
-    return MarkerArray().deserialize(_bytes(message)).markers
+    return MarkerArray().deserialize(serialised(message)).markers
 
 
 def _object_by_object(boxes, number):
@@ -88,7 +82,7 @@ def test_the_bytes_are_those_of_markers_built_point_by_point(intervals):
     numbers = [marker.id for marker in _read(packed)]
     assert len(set(numbers)) == len(numbers)
     expected = [_object_by_object(boxes, number) for boxes, number in zip(boxes_by_list(blocks), numbers)]
-    assert _bytes(packed) == _bytes(MarkerArray(markers=expected))
+    assert serialised(packed) == serialised(MarkerArray(markers=expected))
 
 
 def test_a_class_of_boxes_that_vanished_is_deleted_once():
@@ -231,7 +225,7 @@ def message_type(monkeypatch):
 def received(message_type):
     """Return the message as it arrives."""
     tree = octree(random_map(0).blocks, random_map(1).blocks)
-    return message_type().deserialize(_bytes(octomap_message(tree, Header(frame_id="map"))))
+    return message_type().deserialize(serialised(octomap_message(tree, Header(frame_id="map"))))
 
 
 def test_the_type_is_that_of_octomap_msgs(message_type):

@@ -6,7 +6,7 @@ from functools import lru_cache
 import numpy as np
 import pytest
 from made_harbour import CANAL, ahead, along_canal, deaf, reporting, selected, tour
-from made_models import COMPASS, followed
+from made_models import COMPASS, errors_of, followed
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.estimate import scale_covariance
@@ -164,13 +164,6 @@ def made():
 def solver_of(made):
     """Return a call that gives the solver of a kind of odometry, after the whole tour."""
     return lru_cache(maxsize=None)(lambda kind: followed(made.scans, parameters(kind)))
-
-
-def errors_of(solver, made):
-    ends = np.array([estimate.time for estimate in solver.estimates])
-    truth = made.truth.at(ends) - made.truth.at(0.0) * [1.0, 1.0, 0.0]
-    path = np.array([estimate.T_map_base for estimate in solver.estimates])
-    return path - solver.log.node_poses(np.array([0])) * [1.0, 1.0, 0.0] - truth
 
 
 # Of hovering vehicles test_strafing.py tells.

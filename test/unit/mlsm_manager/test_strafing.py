@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, logged, tour
-from made_models import followed
+from made_models import errors_of, followed
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, fitted, profile_values, strafes
@@ -46,19 +46,16 @@ def ahead():
     return solver_of(OdometryKind.HEADING)
 
 
-def errors_of(solver):
-    ends = np.array([estimate.time for estimate in solver.estimates])
-    path = np.array([estimate.T_map_base[:2] for estimate in solver.estimates])
-    start = solver.log.node_poses(np.array([0]))[0, :2]
-    return np.hypot(*(path - start - (MADE.truth.at(ends) - MADE.truth.at(0.0))[:, :2]).T)
+def distances(solver):
+    return np.hypot(*errors_of(solver, MADE)[:, :2].T)
 
 
 def test_it_is_found_where_it_is(hovering):
-    assert np.median(errors_of(hovering)) < 1.0
+    assert np.median(distances(hovering)) < 1.0
 
 
 def test_the_profile_for_vehicles_that_go_ahead_loses_it(ahead):
-    assert np.median(errors_of(ahead)) > 3.0
+    assert np.median(distances(ahead)) > 3.0
 
 
 def test_echoes_tell_that_it_strafes(ahead, hovering):
