@@ -60,15 +60,15 @@ class LiveCauses:
             self._is_new, scans, places = False, list(self._scans), self._places
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
         track = _track(scans)
-        of_echoes = echo_findings(scans, self.sonar_in_base, corrections).causes
+        of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
         path = composed(corrections.at(track.times), track.poses)
         of_beams, spread = standing_causes(scans, track, path), np.zeros((2, 2))
         found = [*of_echoes, *of_beams]
         run = newest_run()
         if run is not None:
             # What a stuck compass missed is not tried: the path is not mended live.
-            suspected = [cause.fault for cause in found if cause.fault is not None]
-            motion = _motion_of(run, [fault for fault in suspected if fault.kind is not FaultKind.STUCK])
+            shown = [cause.fault for cause in found if cause.fault is not None]
+            motion = _motion_of(run, [*suspected, *(fault for fault in shown if fault.kind is not FaultKind.STUCK)])
             found, spread = motion.told_with(of_echoes, of_beams), motion.spread(run.log.node_times[-1:])[0]
         found += [of_stuck(*one) for one in stuck_headings(track)]
         with self._lock:

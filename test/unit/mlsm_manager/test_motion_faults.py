@@ -10,9 +10,10 @@ from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
 from made_recordings import touring
 
-from mlsm_manager.localisation.odometry_profiles import OdometryKind
+from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.offline.recording import scans_of
+from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
 from mlsm_manager.self_check.echo_causes import echo_findings
@@ -128,6 +129,20 @@ def test_a_slip_of_the_head_beside_a_compass_alone_is_named_and_the_path_fitted_
     found = mapped_as(broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0), "--refine")
     assert_named_first(found.findings, "the head slipped by 2")
     assert off(found).mean() < 1.0  # m
+
+
+@pytest.mark.long
+@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
+def test_a_slip_of_the_head_beside_a_compass_alone_is_named_within_three_turns_while_the_run_goes_on():
+    parameters = ReplayParameters().changed(profile_values(OdometryKind.HEADING))
+    recording = broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0)
+    localiser = parameters.build_localiser(recording.sonar_in_base)
+    scans = [scan for scan, _ in scans_of(recording, EchoExtractor(parameters.echoes()))]
+    after = [scan for scan in scans if scan.reference_time >= START + MIDDLE]
+    for scan in scans[: len(scans) - len(after) + 3]:
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+    assert localiser.following.causes()[0].text.startswith("the head slipped by 2")
 
 
 @pytest.mark.long
