@@ -1,6 +1,6 @@
-"""Writes the generated files: the default yaml files, two pages of docs, and the files that make filters nodes.
+"""Writes the generated files: the default yaml files, tables in docs, and the files that make filters nodes.
 
-These pages are docs/nodes.md and docs/from_2015.md. A filter in the table of stages gets an executable, a
+The tables are those of docs/nodes.md and docs/from_2015.md. A filter in the table of stages gets an executable, a
 dynamic_reconfigure description and a launch file.
 """
 
@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Dict, List, Type
 
 import yaml
-from from_2015 import from_2015_page
+from from_2015 import from_2015_tables
 from parameter_text import default_yaml, markdown_table, start_up_yaml
 
 from autopilot_link.parameters import AutopilotLinkParameters
@@ -36,27 +36,6 @@ from sonar_simulator.simulation.simulation import GROUPS, SimulatorParameters
 from web_page.parameters import WebPageParameters
 
 ROOT = Path(__file__).resolve().parent.parent
-NODES_INTRODUCTION = """\
-# Nodes: topics, services and parameters
-
-*Written by `scripts/document` from `src/node_support/node_table.py` and the parameter dataclasses; do not edit.*
-
-Topic names are relative, so that a namespace (`ROS_NAMESPACE`, `<group ns=...>`) can hold a whole vehicle. Every node
-also publishes `/diagnostics`. `yaml/<node>_default.yaml` holds every parameter with its meaning and default.
-
-Parameters marked * can be changed with dynamic_reconfigure while the node runs. A value that is not allowed is
-refused, and the old value stays. `dynparam set` does not say so where it is typed: the node's log says why, and
-`rosrun dynamic_reconfigure dynparam get NODE` shows what holds.
-
-Parameters named `expert/...` are hardly ever changed. They stand under the key `expert` in yaml files and on the
-parameter server, each with the reason for its default. Keys of older versions are taken over, or left out where they
-are gone, and the node names them in one warning. An unknown key is refused, with the name of one that resembles it.
-
-`sonar_processing` and `mapping` run several of these nodes in one process. `sonar_processing` runs sonar_to_cloud,
-sonar_image and the stages listed in its parameter `~chain`, a list of node names, by default `[thresholder,
-outlier_remover, echo_extractor]`. `mapping` also runs mlsm_core. Topics are the same as with one node per stage, and
-parameters stay in the namespaces of the stages (`/thresholder/mode`).
-"""
 EXECUTABLE = """\
 #!/usr/bin/env python3
 from sonar_processing.ros.pipeline import run_stage
@@ -129,10 +108,12 @@ def generated() -> Dict[Path, str]:
         texts[ROOT / f"nodes/{name}"] = EXECUTABLE.format(**words)
         texts[ROOT / f"cfg/{config_name(name)}.cfg"] = CONFIGURATION.format(**words)
         texts[ROOT / f"launch/{name}.launch"] = LAUNCH.format(**words)
-    texts[ROOT / "docs/nodes.md"] = nodes_page()
-    texts[ROOT / "docs/from_2015.md"] = from_2015_page(
-        LIVE_NODES, yaml.safe_load((ROOT / "yaml/thesis.yaml").read_text())
-    )
+    thesis = yaml.safe_load((ROOT / "yaml/thesis.yaml").read_text())
+    pages = {"nodes": nodes_sections(), "from_2015": from_2015_tables(LIVE_NODES, thesis)}
+    for name, tables in pages.items():
+        path = ROOT / f"docs/{name}.md"
+        # What stands before the first generated heading is written by hand.
+        texts[path] = path.read_text().partition(tables[: tables.index("\n") + 1])[0] + tables
     return texts
 
 
@@ -159,10 +140,9 @@ def _setting(setting: Setting, indent: str) -> List[str]:
     return [f"{indent}# {setting.reason}", f"{indent}{setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
 
 
-def nodes_page() -> str:
-    """Return docs/nodes.md: purpose, topics, services and parameters of every node."""
-    sections = [_node_section(name, node, _parameter_tables(name)) for name, node in NODES.items()]
-    return "\n".join([NODES_INTRODUCTION, *sections])
+def nodes_sections() -> str:
+    """Return the sections of docs/nodes.md: purpose, topics, services and parameters of every node."""
+    return "\n".join(_node_section(name, node, _parameter_tables(name)) for name, node in NODES.items())
 
 
 def _node_section(name: str, node: NodeDescription, tables: Dict[str, str]) -> str:
