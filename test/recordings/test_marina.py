@@ -6,6 +6,12 @@ import sys
 from pathlib import Path
 
 import pytest
+from benchmarks.fault_makers import range_told
+from benchmarks.faults import shortened
+from benchmarks.harness import mapped_as
+
+from mlsm_manager.offline.recording import read_recording
+from recordings.reader import Request
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -34,3 +40,8 @@ def test_the_odometry_alone_errs_by_more_than_6_m(marina):
 
 def test_nearly_all_scans_are_matched(marina):
     assert marina["matched"] >= 0.9 * marina["scans"]
+
+
+def test_a_range_setting_that_is_shortened_does_not_make_the_odometry_look_too_long(recording):
+    whole = shortened(read_recording(recording("marina_first.bag"), Request()), 600.0)
+    assert not mapped_as(range_told(whole, at=200.0, share=0.4), "--refine").findings.trust.causes

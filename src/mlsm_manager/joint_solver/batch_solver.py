@@ -39,7 +39,7 @@ class BatchResult:
 
     node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2). told: what the echoes
     alone tell of the unknowns of a mixture of priors; None without one. log_likelihood: of echoes on surfaces, less
-    that of odd motions.
+    that of odd motions. on_surfaces: its first part. compared: how many comparisons that is of, each as it counts.
     """
 
     state: State
@@ -50,6 +50,8 @@ class BatchResult:
     converged: bool
     told: Optional[Gaussian]
     log_likelihood: float
+    on_surfaces: float
+    compared: float
 
 
 @dataclass(frozen=True)
@@ -109,9 +111,11 @@ def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     steps, converged = problem.converge()
     poses, of_run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
-    likelihood = problem.log_likelihood()
-    times = run.log.node_times.copy()
-    return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
+    (on_surfaces, compared), odd = problem.on_surfaces(), problem.odd_motions()
+    times, told = run.log.node_times.copy(), problem.told()
+    return BatchResult(
+        problem.state, times, poses, of_run, steps, converged, told, on_surfaces - odd, on_surfaces, compared
+    )  # fmt: skip
 
 
 def likelihood_of(run: Solution, across: float = np.nan) -> float:
@@ -119,7 +123,8 @@ def likelihood_of(run: Solution, across: float = np.nan) -> float:
 
     across: s, where only what scans before and after it tell of each other is to count; NaN for all.
     """
-    return _Batch(run).log_likelihood(across)
+    problem = _Batch(run)
+    return problem.on_surfaces(across)[0] - problem.odd_motions()
 
 
 def fit_path(live: LiveSolver, start: State) -> State:
@@ -193,14 +198,17 @@ class _Batch:
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
-    def log_likelihood(self, across: float = np.nan) -> float:
-        """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""
+    def on_surfaces(self, across: float = np.nan) -> Tuple[float, float]:
+        """Return the log likelihood of echoes on surfaces, and of how many comparisons; across: see likelihood_of."""
         points, pairs = self._met()
         if not np.isnan(across):
             later = self._run.log.node_times[points.scans] >= across
             pairs = pairs._replace(importance=pairs.importance * (later[pairs.rows] != later[pairs.neighbours]))
-        on_surfaces = support(pairs, points, points, self._parameters)
-        return on_surfaces - 0.5 * self._expected().cost
+        return support(pairs, points, points, self._parameters), float(pairs.importance.sum())
+
+    def odd_motions(self) -> float:
+        """Return by how much what is expected of the unknowns without any echo makes the state unlikely, nats."""
+        return 0.5 * self._expected().cost
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
