@@ -1,13 +1,8 @@
 """The sections of scripts/results that take a few seconds, so that no change of a library breaks them unseen."""
 
 import re
-import sys
-from pathlib import Path
 
 import pytest
-
-sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "scripts"))
-
 from thesis_results.__main__ import SECTIONS
 from thesis_results.pictures import MOST_BYTES, Pictures
 

@@ -8,7 +8,6 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 from hypothesis import HealthCheck, settings
 
 ROOT = Path(__file__).resolve().parents[2]
-sys.path.insert(0, str(ROOT / "scripts"))
 # Last, so that none of the rostests' modules hides another module.
 sys.path.append(str(ROOT / "test" / "rostest"))
 # What tests of several packages share, and those of several drivers.
