@@ -12,10 +12,7 @@ from typing import List
 import numpy as np
 import rospy
 from graph import PACKAGE_ROOT, run, temporary_folder
-from marina import replayed
 from resumed_vehicle import Fate, Kill, Mission, ResumedVehicle
-
-from mlsm_manager.scan_matching.scan import Track
 
 sys.path += [str(PACKAGE_ROOT / "test/unit"), str(PACKAGE_ROOT / "test/unit/mlsm_manager")]
 
@@ -27,16 +24,12 @@ VEHICLES = 4
 """Vehicles at the same time."""
 KNOWN = 0.5
 """m, to which a path is known that is the truth."""
-KNOWN_OF_RUN = 2.0
-"""m, to which a path is known that was found without kills, by which no scan is lost."""
-
-
 KEPT = 0.9
 """Share of the saved cells; scans that may still move are drawn anew, and floats of 32 bits fall into other cells."""
 
 
 class ResumeKills(unittest.TestCase):
-    """Vehicles are killed `~kills` times altogether, in harbours that are made or in the recording `~bag`."""
+    """Vehicles are killed `~kills` times altogether, each in a harbour of its own."""
 
     def test_no_kill_loses_the_map_or_puts_the_vehicle_elsewhere(self) -> None:
         folder = temporary_folder(self)
@@ -47,14 +40,8 @@ class ResumeKills(unittest.TestCase):
         self.assertEqual([kill for kill in kills if kill.map_kept < KEPT or kill.fate is Fate.WRONG], [])
         self.assertGreater(sum(kill.fate is Fate.GOES_ON for kill in kills), len(kills) // 2)
 
-    @classmethod
-    def setUpClass(cls) -> None:
-        bag = rospy.get_param("~bag")
-        cls.recorded = recorded_mission(Path(bag)) if bag else None
-
     def _kills(self, folder: Path, number: int) -> List[Kill]:
-        mission = self.recorded or made_mission(number)
-        return ResumedVehicle(f"/vehicle_{number}", folder, mission).die_often(KILLS_PER_MISSION)
+        return ResumedVehicle(f"/vehicle_{number}", folder, made_mission(number)).die_often(KILLS_PER_MISSION)
 
 
 def tell(kills: List[Kill]) -> None:
@@ -78,16 +65,6 @@ def made_mission(seed: int) -> Mission:
         "free_scans": 8,
     }  # fmt: skip
     return Mission(made.scans, made.odometry, made.truth, KNOWN, parameters, SONAR_IN_BASE)
-
-
-def recorded_mission(bag: Path) -> Mission:
-    """Return a recording of the marina, with the path that is found without kills."""
-    run = replayed(bag)
-    found = [(one.scan.reference_time, one.result.pose) for one in run.updates if one.result is not None]
-    wanted = Track(np.array([time for time, _ in found]), np.array([pose for _, pose in found]))
-    parameters = rospy.get_param("/marina_live/mlsm_core")
-    odometry = Track(run.times, run.odometry)
-    return Mission(run.scans, odometry, wanted, KNOWN_OF_RUN, parameters, run.solver.log.sonar_in_base)
 
 
 if __name__ == "__main__":
