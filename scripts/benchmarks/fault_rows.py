@@ -124,6 +124,7 @@ ROWS = (
     FaultRow("odometry in feet", partial(broken.odometry_scaled, factor=3.28), _LENGTHS),
     FaultRow("odometry {} s late", rare.odometry_late, _STAMPS, "seconds", 3.0),
     FaultRow("x and y of the DVL swapped", rare.positions_swapped, _MOVES),
+    FaultRow("x and y of odom swapped", rare.axes_swapped, "positions are mirrored"),
     FaultRow("compass sticks", rare.compass_sticks, "compass stuck", begins=True),
     FaultRow("compass trembles by {} deg", rare.compass_noisy, "compass trembles", "degrees", 5.0),
     FaultRow("compass {} deg off, positions right", rare.compass_off, _MOVES, "degrees", 60.0),

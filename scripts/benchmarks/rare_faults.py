@@ -162,8 +162,13 @@ def bottom_lost(recording: Recording, at: float, seconds: float, speed: float = 
     return odometry_drifts(recording, at, speed, seconds)
 
 
+def axes_swapped(recording: Recording) -> Recording:
+    """Let x and y of odom be swapped, as between east north up and north east down, and headings be right."""
+    return with_odometry(recording, recording.track.poses[:, [1, 0, 2]])
+
+
 def positions_swapped(recording: Recording) -> Recording:
-    """Let x and y be swapped, as between east north up and north east down, and headings be right."""
+    """Let x and y of the DVL be swapped, and headings be right."""
     steps = steps_of(recording.track.poses)
     steps[:, :2] = steps[:, 1::-1]
     return with_odometry(recording, integrated(recording.track.poses[0], steps))

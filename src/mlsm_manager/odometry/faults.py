@@ -109,11 +109,14 @@ def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.column_stack([places.real, places.imag, yaws])
 
 
-def with_moves_turned(track: Track, turn: float) -> Track:
-    """Return a track whose moves are turned by `turn` [rad] against the vehicle, whose headings stay."""
-    steps = composed(inverse(track.poses[:-1]), track.poses[1:])
-    steps[:, :2] = rotated(steps[:, :2], np.full(len(steps), turn))
-    return track.with_poses(integrated(track.poses[0], steps))
+def with_positions_turned(track: Track, turn: float, is_mirrored: bool) -> Track:
+    """Return a track whose positions are turned by `turn` [rad], once y counts the other way where `is_mirrored`.
+
+    It begins where it began, and headings stay: so are moves turned of a DVL that is mounted turned.
+    """
+    start = track.poses[0, :2]
+    gone = (track.poses[:, :2] - start) * [1.0, -1.0 if is_mirrored else 1.0]
+    return track.with_poses(np.column_stack([start + rotated(gone, np.full(len(gone), turn)), track.poses[:, 2]]))
 
 
 def _after(times: np.ndarray, _: np.ndarray, begin: float) -> np.ndarray:

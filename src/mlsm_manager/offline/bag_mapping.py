@@ -14,7 +14,7 @@ from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind, strafes
-from mlsm_manager.odometry.faults import with_moves_turned
+from mlsm_manager.odometry.faults import with_positions_turned
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings, Trust
@@ -36,7 +36,7 @@ from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
 from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck, ranked
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import moves_are_turned
-from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, of_turned_moves, turn_text
+from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, of_odometry, turn_text
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.motion_findings import goes_on_with_other_ranges
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -100,10 +100,10 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
     found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
-    if _moves_are_turned(recording, found, options):
-        recording = recording.with_track(with_moves_turned(recording.track, -found.mount.turn))
-        cause = of_turned_moves(found.mount.turn)
-        return _mapped(recording, [*causes, cause], odometry._replace(moves_turned=True), options)
+    if not odometry.moves_turned and _moves_are_turned(recording, found.mount, options):
+        track = with_positions_turned(recording.track, -found.mount.turn, found.mount.is_mirrored)
+        known = odometry._replace(moves_turned=True)
+        return _mapped(recording.with_track(track), [*causes, of_odometry(found.mount)], known, options)
     of_echoes = [*mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
     refined, refitted = None, []
@@ -181,10 +181,12 @@ def _positions_mislead(
     return goes_on_better(believed[-1], alone.solver.solution)
 
 
-def _moves_are_turned(recording: Recording, found: EchoFindings, options: Namespace) -> bool:
-    """Return whether the odometry's moves are turned, not the sonar, unless a turned sonar is to be put right."""
-    seems_turned = found.mount.turn != 0.0 and not found.mount.is_over and not options.fix_mount
-    return seems_turned and moves_are_turned(recording.track, found.mount.turn)
+def _moves_are_turned(recording: Recording, mount: Hypothesis, options: Namespace) -> bool:
+    """Return whether the odometry's moves are turned or mirrored, unless a turned sonar is to be put right."""
+    if mount.is_mirrored:
+        return True
+    seems_turned = mount.turn != 0.0 and not mount.is_over and not options.fix_mount
+    return seems_turned and moves_are_turned(recording.track, mount.turn)
 
 
 def _runs(replayed: Replayed, refined: Optional[Refined]) -> List[Solution]:
@@ -220,7 +222,7 @@ def _heard(
     """
     scans, mended = _scans(recording, extractor, options), []
     found = echo_findings(scans, recording.sonar_in_base) if options.fix_mount else EchoFindings([], AS_TOLD)
-    if found.mount != AS_TOLD:
+    if found.mount != AS_TOLD and not found.mount.is_mirrored:
         recording = recording.mounted(found.mount.turn, found.mount.is_over)
         scans = _scans(recording, extractor, options)
         mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes]

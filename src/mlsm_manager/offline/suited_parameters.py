@@ -48,7 +48,7 @@ _WITHOUT_MOTION: Dict[Optional[SweepMotion], Dict[str, float]] = {
 class OdometryFound(NamedTuple):
     """kind: of the odometry. reason: one line that says why. motion: what sweeps tell where nothing was recorded.
 
-    is_said: somebody says that the vehicle stood still. moves_turned: whether its moves were turned, by the echoes.
+    is_said: somebody says that the vehicle stood still. moves_turned: or mirrored, by the echoes.
     """
 
     kind: OdometryKind

@@ -52,8 +52,9 @@ def echo_findings(
         return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
     honest, best, tried = pairs.honest, *_turned(pairs)
     nats = pairs.evidence(best, honest) - np.log(tried)
-    if nats > _NATS and (best.is_over or abs(best.turn) > _TURN_TOLD):
-        turn = np.pi if best.is_over else abs(best.turn)  # if it is the odometry, the path is mirrored
+    is_flipped = best.is_over or best.is_mirrored
+    if nats > _NATS and (is_flipped or abs(best.turn) > _TURN_TOLD):
+        turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
     found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, _NATS)]
     return EchoFindings(ranked(found), AS_TOLD)
@@ -67,13 +68,16 @@ def _reports_positions(scans: Sequence[Scan]) -> bool:
 def _turned(pairs: ScanPairs) -> Tuple[Hypothesis, int]:
     """Return the likeliest mount, and how many were tried."""
     angles = np.arange(-np.pi, np.pi, _COARSE)
-    tried = [Hypothesis(turn=float(turn), is_over=over) for over in (False, True) for turn in angles]
+    sides = (AS_TOLD, Hypothesis(is_over=True), Hypothesis(is_mirrored=True))
+    tried = [one for side in sides for one in around(side, "turn", angles)]
     coarse = pairs.best(tried)
     return pairs.best(around(coarse, "turn", coarse.turn + _FINE * np.arange(-4, 5))), len(tried)
 
 
 def turn_text(found: Hypothesis) -> str:
     """Return what is said of a mount."""
+    if found.is_mirrored:
+        return "the odometry's positions are mirrored beside its headings: x and y are swapped, or one is reversed"
     turn = (np.degrees(found.turn) + 180.0) % 360.0 - 180.0
     angle = f"turned by {turn:.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg against tf"
     if not found.is_over:
@@ -84,17 +88,18 @@ def turn_text(found: Hypothesis) -> str:
     return side if abs(turn) < np.degrees(_TURN_TOLD) else f"{side}; it is {angle} besides"
 
 
-def of_turned_moves(turn: float) -> Cause:
-    """Return the cause for an odometry whose moves were turned by `turn` [rad], and are put right.
+def of_odometry(found: Hypothesis) -> Cause:
+    """Return the cause for an odometry whose positions were mirrored or whose moves were turned, and are put right.
 
     Where it is the compass that is off, beside positions that are right, the path is turned by as much.
     """
-    angle = f"{np.degrees(turn):.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg"
+    if found.is_mirrored:
+        return Cause(turn_text(found), CERTAIN, is_mended=True, turn=TURN_DEVIATION)
+    angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg"
     text = f"the odometry's direction of motion is turned by {angle} against the vehicle"
-    if abs(abs(turn) - np.pi / 2.0) < _SWAPPED:
+    if abs(abs(found.turn) - np.pi / 2.0) < _SWAPPED:
         text += ", or its x and y are swapped"
-    text += ", or the compass is off"
-    return Cause(text, CERTAIN, is_mended=True, turn=abs(turn))
+    return Cause(f"{text}, or the compass is off", CERTAIN, is_mended=True, turn=abs(found.turn))
 
 
 def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:

@@ -27,12 +27,14 @@ _SCALES = np.arange(0.6, 1.65, 0.1)  # of distances that thrusters report
 class Hypothesis:
     """What may be wrong. turn: rad, of the sonar against tf, counter-clockwise. is_over: it hangs the other way round.
 
+    is_mirrored: reported positions are, so that y counts the other way, but headings are not.
     ahead, aside: m, of the sonar's true place from that in tf. scale: true over reported distances. delay: s by which
     beams are later than their stamps. as_solved: the vehicle went as the solver found it, not as the odometry says.
     """
 
     turn: float = 0.0
     is_over: bool = False
+    is_mirrored: bool = False
     ahead: float = 0.0
     aside: float = 0.0
     scale: float = 1.0
@@ -105,7 +107,8 @@ class ScanPairs:
     def _poses(self, track: Track, times: np.ndarray, hypothesis: Hypothesis) -> np.ndarray:
         """Return where the vehicle was when beams came with the stamps `times` (n,) [s]."""
         times = times + hypothesis.delay
-        poses = track.at(times) * [hypothesis.scale, hypothesis.scale, 1.0]
+        side = -1.0 if hypothesis.is_mirrored else 1.0
+        poses = track.at(times) * [hypothesis.scale, side * hypothesis.scale, 1.0]
         return composed(self._corrections.at(times), poses) if hypothesis.as_solved else poses
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:

@@ -194,6 +194,7 @@ def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
         (broken.head_slips(WHOLE, MIDDLE, 40.0), "the head slipped by "),
         (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0."),
         (broken.delayed(WHOLE, 8.0), "beams were sent"),
+        (rare.axes_swapped(WHOLE), "the odometry's positions are mirrored"),
         (rare.bottom_lost(WHOLE, MIDDLE, 40.0), "the vehicle was carried by 1"),
     ],
 )
@@ -250,13 +251,21 @@ def test_a_mount_that_is_put_right_has_no_cause_left(fault):
     assert found_in(recording.mounted(mount.turn, mount.is_over)).causes == []
 
 
-def test_moves_that_go_as_far_aside_as_the_sonar_seems_turned_are_put_right_and_no_check_is_fine():
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (rare.positions_swapped, "direction of motion is turned by "),
+        (rare.axes_swapped, "positions are mirrored beside its headings"),
+    ],
+)
+def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_fine(fault, said):
     whole, options = shortened(WHOLE, 200.0), map_bag_arguments(["recording", "--out", "nowhere"])
-    found, right = mapped_bag(rare.positions_swapped(whole), options), mapped_bag(whole, options)
+    found, right = mapped_bag(fault(whole), options), mapped_bag(whole, options)
     trust = found.findings.trust
-    assert "mended: the odometry's direction of motion is turned by " in trust.line
+    assert f"mended: the odometry's {said}" in trust.line
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
-    assert np.hypot(*(found.run.best - right.run.best)[:, :2].T).max() < 1.5
+    apart = (found.run.best - right.run.best)[:, :2]
+    assert np.hypot(*(apart - apart[0]).T).max() < 1.0
 
 
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
