@@ -39,7 +39,7 @@ class BatchResult:
 
     node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2). told: what the echoes
     alone tell of the unknowns of a mixture of priors; None without one. log_likelihood: of echoes on surfaces, less
-    that of odd motions. on_surfaces: its first part. compared: how many comparisons that is of, each as it counts.
+    that of odd motions.
     """
 
     state: State
@@ -50,8 +50,6 @@ class BatchResult:
     converged: bool
     told: Optional[Gaussian]
     log_likelihood: float
-    on_surfaces: float
-    compared: float
 
 
 @dataclass(frozen=True)
@@ -111,11 +109,9 @@ def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     steps, converged = problem.converge()
     poses, of_run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
-    (on_surfaces, compared), odd = problem.on_surfaces(), problem.odd_motions()
-    times, told = run.log.node_times.copy(), problem.told()
-    return BatchResult(
-        problem.state, times, poses, of_run, steps, converged, told, on_surfaces - odd, on_surfaces, compared
-    )  # fmt: skip
+    likelihood = problem.log_likelihood()
+    times = run.log.node_times.copy()
+    return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
 
 
 def likelihood_of(run: Solution, across: float = np.nan) -> float:
@@ -123,8 +119,19 @@ def likelihood_of(run: Solution, across: float = np.nan) -> float:
 
     across: s, where only what scans before and after it tell of each other is to count; NaN for all.
     """
-    problem = _Batch(run)
-    return problem.on_surfaces(across)[0] - problem.odd_motions()
+    return _Batch(run).log_likelihood(across)
+
+
+def compared_since(run: Solution, begin: float) -> Tuple[float, float]:
+    """Return how many comparisons a run has, each as it counts, and their log likelihood at its state.
+
+    begin: s, from which on one of both was heard; NaN for all.
+    """
+    points, pairs = _Batch(run).met()
+    if not np.isnan(begin):
+        later = run.log.node_times[points.scans] >= begin
+        pairs = pairs._replace(importance=pairs.importance * (later[pairs.rows] | later[pairs.neighbours]))
+    return float(pairs.importance.sum()), support(pairs, points, points, run.parameters)
 
 
 def fit_path(live: LiveSolver, start: State) -> State:
@@ -181,7 +188,7 @@ class _Batch:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
         equations, parameters = self._expected(), self._parameters
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
-        points, pairs = self._met()
+        points, pairs = self.met()
         add_comparisons(equations, self._layout, [(pairs, points, points)], parameters, parameters.cut)
         if self._posts is not None:
             self._posts.add(equations, self._layout, self._run.placed_posts(self._posts.rows), parameters.cut)
@@ -198,17 +205,14 @@ class _Batch:
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
-    def on_surfaces(self, across: float = np.nan) -> Tuple[float, float]:
-        """Return the log likelihood of echoes on surfaces, and of how many comparisons; across: see likelihood_of."""
-        points, pairs = self._met()
+    def log_likelihood(self, across: float = np.nan) -> float:
+        """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""
+        points, pairs = self.met()
         if not np.isnan(across):
             later = self._run.log.node_times[points.scans] >= across
             pairs = pairs._replace(importance=pairs.importance * (later[pairs.rows] != later[pairs.neighbours]))
-        return support(pairs, points, points, self._parameters), float(pairs.importance.sum())
-
-    def odd_motions(self) -> float:
-        """Return by how much what is expected of the unknowns without any echo makes the state unlikely, nats."""
-        return 0.5 * self._expected().cost
+        on_surfaces = support(pairs, points, points, self._parameters)
+        return on_surfaces - 0.5 * self._expected().cost
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the unknowns without any echo."""
@@ -224,7 +228,7 @@ class _Batch:
             _add_fixed_steps(equations, self._layout, now, fixed)
         return equations
 
-    def _met(self) -> Tuple[PlacedPoints, Pairs]:
+    def met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         parameters = self._parameters
         rows = self._run.log.surfaces.rows(0, self._layout.last)

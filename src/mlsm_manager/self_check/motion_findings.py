@@ -5,7 +5,7 @@ from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
+from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
@@ -33,6 +33,7 @@ from node_support.geometry import composed, inverse, rotated, transformed
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 _NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
+_NATS_CHANGED = 7.6  # of distances from any moment on: where half of the circle was heard, a wrong change gained 6.4
 _NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
 _SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
@@ -174,13 +175,19 @@ def motion_findings(
         if len(found.causes) == _FAULTS or not faults:
             break
         best = _best(found, faults)
-        needed = _NATS_ALONE if found.is_alone and best.fault.kind in _SUDDEN else _NATS
-        if best.gain < needed or not best.fault.is_beyond(errors.times[-1]):
+        if best.gain < _needed(found, best.fault) or not best.fault.is_beyond(errors.times[-1]):
             break
         found = _without(found, best)
         suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
     others = [places, first] if found.causes else [places] if _errs(errors) else []
     return replace(found, apart=[other - _places(found.run) for other in others])
+
+
+def _needed(found: MotionFindings, fault: Fault) -> float:
+    """Return by how many nats a run must be likelier without a fault for that to be named."""
+    if found.is_alone and fault.kind in _SUDDEN:
+        return _NATS_ALONE
+    return _NATS_CHANGED if fault.kind is FaultKind.DISTANCES else _NATS
 
 
 def _tells(track: Track) -> bool:
@@ -280,15 +287,17 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     fit = fit_turned(run, track) if turns else fit_with(run, track, span)
     run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
     needed = _NATS_TURNED if fault.kind is FaultKind.STUCK and fault.sizes[0] else 0.0
-    needed += _of_more(fit, found.fit) if fault.kind in OF_DISTANCES else 0.0
+    needed += _of_more(found, run, fit, fault.begin) if fault.kind in OF_DISTANCES else 0.0
     return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood - needed)
 
 
-def _of_more(fit: BatchResult, before: BatchResult) -> float:
-    """Return by how much a fit is likelier because more is compared than `before`: on a path that is too short, scans
-    that end where the sonar hears no farther lie on each other.
+def _of_more(found: MotionFindings, run: Solution, fit: BatchResult, begin: float) -> float:
+    """Return by how much a fit is likelier because more is compared from `begin` [s] on than before: on a path that is
+    too short, scans that end where the sonar hears no farther lie on each other.
     """
-    return max(fit.compared - _MORE * before.compared, 0.0) * fit.on_surfaces / max(fit.compared, 1.0)
+    before, _ = compared_since(replace(found.run, state=found.fit.state), begin)
+    compared, likelihood = compared_since(replace(run, state=fit.state), begin)
+    return max(compared - _MORE * before, 0.0) * likelihood / max(compared, 1.0)
 
 
 def _gained(found: MotionFindings, fault: SonarFault, run: Solution, fit: BatchResult) -> float:
