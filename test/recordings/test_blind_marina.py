@@ -5,6 +5,9 @@ from itertools import islice
 
 import numpy as np
 import pytest
+from benchmarks.fault_makers import changed
+from benchmarks.faults import source
+from benchmarks.harness import mapped_as
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -39,3 +42,10 @@ def test_points_moved_by_a_nanometre_move_the_path_by_less_than_a_hundredth_of_a
     moved = [replace(scan, points=scan.points + 1e-9 * rng.standard_normal(scan.points.shape)) for scan in scans]
     distance = path_of(recording, parameters, moved) - path_of(*recorded)
     assert 0.0 < np.abs(distance[:, :2]).max() < 1e-5
+
+
+def test_positions_are_believed_in_a_canal_though_scans_of_a_shorter_path_lie_on_each_other_more(recording):
+    recording("marina_whole_blind.bag")
+    canal = source("canal", 600.0)
+    beams_of_20_m = changed(canal, lambda beam, _: replace(beam, intensities=beam.intensities[:200]), seconds=300.0)
+    assert mapped_as(beams_of_20_m, "--refine").odometry.kind is OdometryKind.AUTO

@@ -23,6 +23,9 @@ _WORTH_TRYING = 0.75
 """Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
 strafing ones 0.57 and 0.66."""
 _CLEARLY = 0.03
+_SHORTER = 0.1
+"""The same on a path that is shorter than by the positions: its scans lie on each other more whatever is true, by .05 in
+a canal."""
 """Share of the echoes that go on once positions are left out: .06 and more where these make no sense, else .01."""
 
 # A pose that is known to stay; one that seems to, by echoes that do not tell all directions as well: 5 mm/s, which they
@@ -124,8 +127,14 @@ def may_strafe(ahead: Solution) -> bool:
     return scans_go_on(ahead.log.node_times[1:], shares_heard_before(ahead, 0), _WORTH_TRYING).fires
 
 
+def _length(run: Solution) -> float:
+    """Return the length of the path of a run, m."""
+    return float(np.hypot(*np.diff(run.node_places(np.arange(len(run.state.nodes))), axis=0).T).sum())
+
+
 def goes_on_better(believed: Solution, alone: Solution) -> bool:
     """Return whether scans go on in the run `alone`, and clearly better than in the one that is `believed`."""
     shares, others = (shares_heard_before(run, 0) for run in (alone, believed))
     gain = float(np.nanmean(shares) - np.nanmean(others))
-    return gain > _CLEARLY and not scans_go_on(alone.log.node_times[1:], shares).fires
+    needed = _SHORTER if _length(alone) < _length(believed) else _CLEARLY
+    return gain > needed and not scans_go_on(alone.log.node_times[1:], shares).fires
