@@ -217,11 +217,11 @@ def range_changed(recording: Recording, at: float, factor: float) -> Recording:
     return changed(recording, stretched, at)
 
 
-def range_told(recording: Recording, at: float, share: float) -> Recording:
-    """Let the range setting become a share of itself, told by the messages."""
+def range_told(recording: Recording, at: float, share: float, seconds: float = np.inf) -> Recording:
+    """Let the range setting become a share of itself for some seconds, told by the messages."""
     return changed(recording, lambda beam, _: replace(
         beam, intensities=beam.intensities[: int(share * len(beam.intensities))]
-    ), at)  # fmt: skip
+    ), at, seconds)  # fmt: skip
 
 
 def gain_changed(recording: Recording, at: float, factor: float) -> Recording:

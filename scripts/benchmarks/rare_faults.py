@@ -172,3 +172,18 @@ def positions_swapped(recording: Recording) -> Recording:
     steps = steps_of(recording.track.poses)
     steps[:, :2] = steps[:, 1::-1]
     return with_odometry(recording, integrated(recording.track.poses[0], steps))
+
+
+def bins_longer(recording: Recording, at: float) -> Recording:
+    """Let bins become twice as long, which the messages tell."""
+
+    def longer(beam: Beam, _: int) -> Beam:
+        pairs = beam.intensities[: len(beam.intensities) // 2 * 2].reshape(-1, 2)
+        return replace(beam, intensities=pairs.max(axis=1), range_resolution=2.0 * beam.range_resolution)
+
+    return changed(recording, longer, at)
+
+
+def front_alone(recording: Recording, at: float) -> Recording:
+    """Let the head look at a sector of 200 degrees ahead from a moment on."""
+    return changed(recording, lambda beam, _: beam if np.cos(beam.angle) > np.cos(np.radians(100.0)) else None, at)

@@ -23,10 +23,10 @@ _WORTH_TRYING = 0.75
 """Share of scans that go on, below which a second mapping is worth its time. Simulated tours ahead have 0.85 and more,
 strafing ones 0.57 and 0.66."""
 _CLEARLY = 0.03
+"""Share of the echoes that go on once positions are left out: .04 and more where these make no sense, else .01."""
 _SHORTER = 0.1
-"""The same on a path that is shorter than by the positions: its scans lie on each other more whatever is true, by .05 in
-a canal."""
-"""Share of the echoes that go on once positions are left out: .06 and more where these make no sense, else .01."""
+"""The same on a path that is shorter than by the positions: its scans lie on each other more, whatever is true: by .05
+in a canal."""
 
 # A pose that is known to stay; one that seems to, by echoes that do not tell all directions as well: 5 mm/s, which they
 # hold back where they tell; and one that drifts as a head on a cable or a moored vehicle: 0.05 m/s for a minute.
