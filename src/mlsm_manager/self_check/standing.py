@@ -34,7 +34,9 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
     if not len(times):
         return []
     inside = [(times[:, 0] >= begin) & (times[:, 1] <= end) for begin, end in stretches]
-    elsewhere = apart[~np.any(inside, axis=0)]
+    # What such a stretch moved unseen lies between the two scans of a pair that reaches into it.
+    outside = [(times[:, 1] <= begin) | (times[:, 0] >= end) for begin, end in stretches]
+    elsewhere = apart[np.all(outside, axis=0)]
     return [
         _cause(begin, end, apart[within], elsewhere)
         for (begin, end), within in zip(stretches, inside)

@@ -17,7 +17,7 @@ from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
 from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended, with_steady_head
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import scans_of
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.companions import without_companions
@@ -242,6 +242,19 @@ def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehi
     still = [scan for scan in scans_in(WHOLE)[:1] for _ in range(5)]
     stands = Track(WHOLE.track.times, np.zeros_like(WHOLE.track.poses))
     assert standing_causes(still, stands, stands.poses) == []
+
+
+def test_pairs_of_scans_that_reach_into_a_frozen_stretch_do_not_tell_how_far_apart_scans_usually_lie():
+    """Four scans a metre apart while the odometry goes, six 1.5 m apart while it stands, and 4 m and more between."""
+    times = np.arange(0.0, 101.0)
+    track = Track(times, np.minimum(times, 40.0)[:, np.newaxis] * [0.1, 0.0, 0.0])
+    scans = []
+    for number, place in enumerate([0.0, 1.0, 0.0, 1.0, 5.0, 6.5, 5.0, 6.5, 5.0, 6.5]):
+        heard = 10.0 * number + np.linspace(0.0, 10.0, 50)
+        points = np.column_stack([np.full(50, place), np.linspace(0.0, 0.1, 50), np.zeros(50), np.ones(50)])
+        scans.append(Scan(points, heard, np.zeros(50, dtype=bool), track, heard[-1]))
+    (cause,) = standing_causes(scans, track, track.poses)
+    assert cause.text.startswith("odometry frozen for 60 s while the echoes move")
 
 
 @pytest.mark.parametrize("fault", [lambda one: broken.mount_turned(one, 120.0), broken.mount_upside_down])
