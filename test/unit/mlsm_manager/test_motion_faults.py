@@ -135,10 +135,10 @@ def test_a_slip_of_the_head_beside_a_compass_alone_is_named_and_the_path_fitted_
 @pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_a_slip_of_the_head_beside_a_compass_alone_is_named_within_three_turns_while_the_run_goes_on():
     parameters = ReplayParameters().changed(profile_values(OdometryKind.HEADING))
-    recording = broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0)
+    recording = broken.head_slips(TWICE_ROUND.without_positions(), 150.0, 25.0)
     localiser = parameters.build_localiser(recording.sonar_in_base)
     scans = [scan for scan, _ in scans_of(recording, EchoExtractor(parameters.echoes()))]
-    after = [scan for scan in scans if scan.reference_time >= START + MIDDLE]
+    after = [scan for scan in scans if scan.reference_time >= START + 150.0]
     for scan in scans[: len(scans) - len(after) + 3]:
         localiser.take_scan(scan)
     localiser.look_for_causes()
