@@ -24,6 +24,16 @@ class CourseFound(NamedTuple):
     deviation: float
 
     @property
+    def is_told(self) -> bool:
+        """Whether the vehicle has a usual course."""
+        return bool(np.isfinite(self.deviation))
+
+    @property
+    def size(self) -> float:
+        """The turn in deviations."""
+        return abs(self.turn) / self.deviation
+
+    @property
     def unexplained(self) -> float:
         """What the deviation does not explain of the turn, rad."""
         return float(np.sqrt(max(self.turn**2 - self.deviation**2, 0.0)))
@@ -66,9 +76,8 @@ def moves_are_turned(reported: Track, turn: float) -> bool:
 
 def course_causes(found: CourseFound) -> List[Cause]:
     """Return that the sonar is turned, where the course shows it."""
-    size = abs(found.turn) / found.deviation
-    if size < _NAMED:
+    if found.size < _NAMED:
         return []
     angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(found.deviation):.0f} deg"
     text = f"the sonar is turned by {angle} against tf, if the vehicle usually goes where its heading points"
-    return [Cause(text, 0.5 * size**2)]
+    return [Cause(text, 0.5 * found.size**2)]

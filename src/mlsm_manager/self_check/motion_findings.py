@@ -23,7 +23,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
 from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import CERTAIN, Cause, Fault, is_same
-from mlsm_manager.self_check.course import LARGEST, course_causes, course_of
+from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
 from mlsm_manager.self_check.map_checks import scans_go_on
@@ -85,8 +85,8 @@ class MotionFindings:
             return self
         # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
         course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
-        gone = places - places[0]
-        aside = rotated(gone, np.full(len(gone), course.unexplained)) - gone
+        gone, told = places - places[0], course if course.is_told else self._direction
+        aside = rotated(gone, np.full(len(gone), told.unexplained)) - gone
         turned = course_causes(course) or self._calibration_causes()
         return replace(self, causes=[*self.causes, *turned], apart=[*self.apart, aside, self._late(places)])
 
@@ -106,18 +106,25 @@ class MotionFindings:
         _, known = self.run.parameters.run_mean(self.run.log)
         return float(delay - known), max(float(deviation), HELD_DEVIATION)
 
+    @property
+    def _direction(self) -> CourseFound:
+        """By how much the sonar is turned if not the odometry is, whose direction of motion the run found."""
+        model = self.run.odometry
+        if DIRECTION not in model.calibrated.values():
+            return NOT_TOLD
+        turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
+        return CourseFound(-turn, float(model.first_deviations()[DIRECTION]))
+
     def _calibration_causes(self) -> List[Cause]:
         """Return what is unlikely of the direction and the delay that the run found."""
-        model, found = self.run.odometry, []
+        found, direction = [], self._direction
         delay, deviation = self._delay
         size = abs(delay) / deviation
         if size > _UNLIKELY_DELAY:
             found.append(delay_cause(delay, 0.5 * size**2))
-        if DIRECTION in model.calibrated.values():
-            turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
-            size = abs(turn) / float(model.first_deviations()[DIRECTION])
-            if size > _UNLIKELY:
-                found.append(Cause(turn_text(Hypothesis(turn=-turn)), 0.5 * size**2, turn=abs(turn)))
+        if direction.size > _UNLIKELY:
+            text = turn_text(Hypothesis(turn=direction.turn))
+            found.append(Cause(text, 0.5 * direction.size**2, turn=abs(direction.turn)))
         return found
 
     def told_with(self, of_echoes: Sequence[Cause], of_beams: Sequence[Cause]) -> List[Cause]:
