@@ -84,26 +84,31 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
     recording, trembling = with_steady_head(recording)
+    recording = recording.corrected(options.parameters.part(BeamCorrection))
     return _mapped(recording, [*causes, *trembling], _odometry(recording, options), options)
 
 
 def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, options: Namespace) -> MappedBag:
-    """Map a recording with an odometry that may be of the kind that was found. causes: what was mended so far."""
+    """Map a recording, whose beams are corrected, with an odometry that may be of the kind that was found.
+
+    causes: what was mended so far.
+    """
     if odometry.kind is OdometryKind.HEADING and not _is_named(options):
         recording = recording.without_positions()
     beams, companions = without_companions(recording.beams, recording.track)
-    recording = replace(recording, beams=beams).corrected(options.parameters.part(BeamCorrection))
+    recording = replace(recording, beams=beams)
     extractor = EchoExtractor(options.parameters.echoes())
     recording, scans, mounted, signs, over = _heard(recording, odometry, extractor, options)
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
     extracting = with_cells(extracting, scans, options.fixed)
     odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
+    causes = [*causes, *over, *companions]
     found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
     if not odometry.moves_turned and _moves_are_turned(recording, found.mount, options):
         track = with_positions_turned(recording.track, -found.mount.turn, found.mount.is_mirrored)
         known = odometry._replace(moves_turned=True)
-        return _mapped(recording.with_track(track), [*causes, of_odometry(found.mount)], known, options)
+        return _mapped(recording.with_track(track), [*causes, *mounted, of_odometry(found.mount)], known, options)
     of_echoes = [*mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
     refined, refitted = None, []
@@ -116,14 +121,14 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, runs, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
         cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
-        return _mapped(recording, [*causes, cause], OdometryFound(OdometryKind.HEADING, reason), options)
+        return _mapped(recording, [*causes, *mounted, cause], OdometryFound(OdometryKind.HEADING, reason), options)
     if options.check:
         with _bar(REFITS, "fit", "check") as bar:
             refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     of_run = [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
-    causes = ranked([*causes, *over, *companions, *of_run])
+    causes = ranked([*causes, *of_run])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))

@@ -281,6 +281,13 @@ def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_f
     assert np.hypot(*(apart - apart[0]).T).max() < 1.0
 
 
+def test_a_recording_that_is_mapped_anew_has_its_ranges_corrected_once():
+    options = map_bag_arguments(["recording", "--out", "nowhere", "--set", "range_scale=1.02"])
+    swapped = rare.positions_swapped(shortened(WHOLE, 200.0))
+    mapped = mapped_bag(swapped, options).recording
+    assert mapped.beams[0].beam.range_resolution == pytest.approx(1.02 * swapped.beams[0].beam.range_resolution)
+
+
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
     options = map_bag_arguments(["recording", "--out", "nowhere", "--fix-mount"])
     trust = mapped_bag(broken.mount_turned(shortened(WHOLE, 200.0), 120.0), options).findings.trust
