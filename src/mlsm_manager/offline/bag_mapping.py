@@ -31,9 +31,9 @@ from mlsm_manager.offline.suited_parameters import (
     with_cells,
     with_odometry,
 )
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
-from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck, ranked
+from mlsm_manager.self_check.causes import CERTAIN, Cause, Fault, of_steps, of_stuck, ranked
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, of_odometry, turn_text
@@ -113,10 +113,8 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
     refined, refitted = None, []
     if options.refine:
-        with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
-            settings = parameters.map_settings()
-            suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
-            refined = refine(replayed, recording.track, settings, [*found.suspected, *suspected], bar.update)
+        suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
+        refined = _refined(replayed, recording.track, parameters, [*found.suspected, *suspected])
     runs = _runs(replayed, refined)
     if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, runs, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
@@ -137,6 +135,11 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
     return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
+
+
+def _refined(replayed: Replayed, track: Track, parameters: ReplayParameters, suspected: Sequence[Fault]) -> Refined:
+    with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
+        return refine(replayed, track, parameters.map_settings(), suspected, bar.update)
 
 
 def _is_named(options: Namespace) -> bool:

@@ -11,6 +11,8 @@ from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
 
 CERTAIN = 1e3  # nats: of what needs no echo to be seen
+NAMED_FROM = float(np.log(100.0 / 0.05))
+"""Nats from which on a cause is named: one in a hundred runs has it, and 95 % are asked for."""
 _FEW = 3  # steps that are told one by one
 _SPEED_CHANGE, _TURN_RATE = 0.15, 0.05  # m/s, rad/s: by which a small vehicle changes its motion while it works
 _LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, besides what it did just before

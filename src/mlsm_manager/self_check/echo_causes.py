@@ -8,7 +8,7 @@ from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
-from mlsm_manager.self_check.causes import CERTAIN, Cause, ranked
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, ranked
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
@@ -21,9 +21,6 @@ _SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0,
 _RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-5.0, 6.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
-# Nats from which on a cause is named: one in a hundred runs has it, and 95 % are asked for. Besides, the more causes
-# are tried the likelier one fits by chance, by the logarithm of their number.
-_NATS = float(np.log(100.0 / 0.05))
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 
 
@@ -51,12 +48,13 @@ def echo_findings(
     if not _reports_positions(scans):
         return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
     honest, best, tried = pairs.honest, *_turned(pairs)
+    # The more causes are tried the likelier one fits by chance.
     nats = pairs.evidence(best, honest) - np.log(tried)
     is_flipped = best.is_over or best.is_mirrored
-    if nats > _NATS and (is_flipped or abs(best.turn) > _TURN_TOLD):
+    if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
-    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, _NATS)]
+    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, NAMED_FROM)]
     return EchoFindings(ranked(found), AS_TOLD)
 
 
@@ -106,7 +104,7 @@ def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     tried = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
     found = pairs.best(tried)
     nats = pairs.evidence(found, honest) - np.log(len(tried))
-    if abs(found.delay) <= _DELAY_TOLD or nats < _NATS:
+    if abs(found.delay) <= _DELAY_TOLD or nats < NAMED_FROM:
         return []
     return [delay_cause(found.delay, nats)]
 
@@ -124,7 +122,7 @@ def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     ahead = pairs.best(around(AS_TOLD, "ahead", steps))
     found = pairs.best(around(ahead, "aside", steps))
     size, nats = float(np.hypot(found.ahead, found.aside)), pairs.evidence(found, honest) - np.log(2 * len(steps))
-    if size < _ARM_TOLD or nats < _NATS:
+    if size < _ARM_TOLD or nats < NAMED_FROM:
         return []
     fault = SonarFault(SonarKind.ARM, np.nan, (found.ahead, found.aside))
     return [Cause(fault.text, nats, metres=size, fault=fault)]
@@ -143,7 +141,7 @@ def _changed(pairs: ScanPairs) -> List[Cause]:
     found = [
         _of_change(one.change, one.begin, one.nats, pairs.typical_range())
         for one in _likely_changes(pairs, [*_SLIPS, *_RANGES], AS_TOLD)
-        if one.nats > _NATS and (one.change.ranges != 1.0 or abs(one.change.turn) > _SLIP_TOLD)
+        if one.nats > NAMED_FROM and (one.change.ranges != 1.0 or abs(one.change.turn) > _SLIP_TOLD)
     ]
     return ranked(found)[:1]
 

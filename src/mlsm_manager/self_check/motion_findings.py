@@ -22,7 +22,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
 )
 from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import CERTAIN, Cause, Fault, is_same
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, is_same
 from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
@@ -33,7 +33,6 @@ from node_support.geometry import composed, inverse, rotated, transformed
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 _NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
-_NATS_CHANGED = 7.6  # of distances from any moment on: where half of the circle was heard, a wrong change gained 6.4
 _NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
 _SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
@@ -191,10 +190,13 @@ def motion_findings(
 
 
 def _needed(found: MotionFindings, fault: Fault) -> float:
-    """Return by how many nats a run must be likelier without a fault for that to be named."""
+    """Return by how many nats a run must be likelier without a fault for that to be named.
+
+    Distances may change at any moment: where half of the circle was heard, a wrong change gained 6.4.
+    """
     if found.is_alone and fault.kind in _SUDDEN:
         return _NATS_ALONE
-    return _NATS_CHANGED if fault.kind is FaultKind.DISTANCES else _NATS
+    return NAMED_FROM if fault.kind is FaultKind.DISTANCES else _NATS
 
 
 def _tells(track: Track) -> bool:
