@@ -12,7 +12,7 @@ import numpy as np
 from mlsm_manager.odometry.faults import integrated
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse, matrices
+from node_support.geometry import matrices, move_of, seen_from
 from sonar_processing.beams.beam import Beam, PlacedBeam
 
 Fault = Callable[[Recording], Recording]
@@ -30,13 +30,13 @@ def after(recording: Recording, at: float) -> np.ndarray:
 
 
 def steps_of(poses: np.ndarray) -> np.ndarray:
-    return composed(inverse(poses[:-1]), poses[1:])
+    return seen_from(poses[:-1], poses[1:])
 
 
 def odometry_restarts(recording: Recording, at: float) -> Recording:
     """Let the odometry begin again at zero."""
     poses, later = recording.track.poses.copy(), after(recording, at)
-    poses[later] = composed(inverse(poses[later][:1]), poses[later])
+    poses[later] = seen_from(poses[later][:1], poses[later])
     return with_odometry(recording, poses)
 
 
@@ -293,7 +293,7 @@ def stamped(recording: Recording, late: np.ndarray) -> Recording:
         time = placed.beam.stamp_ns * 1e-9
         if not track.times[0] <= time + seconds <= track.times[-1]:
             continue
-        move = matrices(composed(track.at(np.array([time + seconds])), inverse(track.at(np.array([time])))))[0]
+        move = matrices(move_of(track.at(np.array([time])), track.at(np.array([time + seconds]))))[0]
         beam = replace(placed.beam, stamp_ns=round(1e9 * (time + seconds)))
         beams.append(PlacedBeam(beam, move @ placed.T_target_sonar, placed.is_moving))
     return replace(recording, beams=beams)

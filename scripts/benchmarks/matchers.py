@@ -14,7 +14,7 @@ from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, P
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.blocks import BlockSource, all_of
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
-from node_support.geometry import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, move_of, seen_from, transformed, wrapped
 
 _FEWEST, _REACH, _MOST_ITERATIONS = 15, 2.0, 50  # points; m; steps, which end one that swings between two poses
 _MOST_DEVIATION, _MOST_JUMP = 0.5, 4.0  # m; standard deviations: as the other matchers reject
@@ -45,14 +45,14 @@ class GicpMatcher:
         if min(len(scan), len(blocks)) >= _FEWEST:
             # About the vehicle: turns and moves are independent there, and a map may lie far from its origin.
             origin = np.append(expected[:2], 0.0)
-            points = transformed(composed(inverse(origin), prior.correction), scan.points)[:, :2]
+            points = transformed(seen_from(origin, prior.correction), scan.points)[:, :2]
             shapes = LocalDistributions(blocks)
             found, information = self._register(points, shapes.mean - origin[:2], shapes.covariance)
             used, error = len(found.correspondence_set), float(found.inlier_rmse)
         if used >= _FEWEST:
             matrix = found.transformation
             moved = np.array([matrix[0, 3], matrix[1, 3], np.arctan2(matrix[1, 0], matrix[0, 0])])
-            T_map_expected = composed(composed(origin, moved), inverse(origin))
+            T_map_expected = move_of(origin, composed(origin, moved))
             correction = composed(T_map_expected, prior.correction)
             covariance = np.linalg.inv(information) * max(error, _LEAST_ERROR) ** 2
             status = _judged(composed(T_map_expected, expected) - expected, covariance, prior)

@@ -14,7 +14,7 @@ from mlsm_manager.scan_matching.distribution_matcher import NEARBY, Distribution
 from mlsm_manager.scan_matching.scan import Prior, Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry import composed, inverse, wrapped
+from node_support.geometry import move_of, wrapped
 from sonar_simulator.simulation.scripted_vehicle import VehicleScript
 
 STARTS = 100
@@ -80,7 +80,7 @@ def _start(maker: ScanMaker, distance: float, angle: float, seed: int) -> Tuple[
 
 
 def _prior(expected: np.ndarray, odometry: np.ndarray, deviations: np.ndarray) -> Prior:
-    return Prior(composed(expected, inverse(odometry)), np.zeros(3), np.zeros(2), np.diag(deviations**2))
+    return Prior(move_of(odometry, expected), np.zeros(3), np.zeros(2), np.diag(deviations**2))
 
 
 def cases(kind: SonarKind) -> Dict[str, Callable[[int], Case]]:

@@ -60,6 +60,16 @@ def inverse(pose: np.ndarray) -> np.ndarray:
     return np.concatenate([position, -pose[..., 2, np.newaxis]], axis=-1)
 
 
+def seen_from(pose: np.ndarray, other: np.ndarray) -> np.ndarray:
+    """Return T_b_c (..., 3) of `pose` = T_a_b and `other` = T_a_c."""
+    return composed(inverse(pose), other)
+
+
+def move_of(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Return what takes a pose to where it is afterwards: T_map_odom (..., 3) of T_odom_base and T_map_base."""
+    return composed(after, inverse(before))
+
+
 def transformed(pose: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Return points (n, >= 2) with x y taken through T_a_b (3,) or (n, 3), further columns as they are."""
     pose = np.asarray(pose, dtype=np.float64)

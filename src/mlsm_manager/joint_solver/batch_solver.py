@@ -17,6 +17,7 @@ from mlsm_manager.joint_solver.normal_equations import (
     YAW,
     Layout,
     NormalEquations,
+    Residuals,
     State,
     solution_of,
 )
@@ -170,6 +171,7 @@ class _Batch:
         self._loops, self._start, self._fixed_steps = list(loops), self.state.copy(), fixed_steps
         self._solution = None
         self._move, self._is_begun = np.zeros(self._layout.size), False
+        self._points = log.surfaces.points(log.surfaces.rows(0, log.scan_count))
         self._lists: Optional[Neighbours] = None
         scans, self._posts = np.arange(log.scan_count), None
         if self._parameters.post_confidence:
@@ -191,9 +193,9 @@ class _Batch:
         points, pairs = self.met()
         add_comparisons(equations, self._layout, [(pairs, points, points)], parameters, parameters.cut)
         if self._posts is not None:
-            self._posts.add(equations, self._layout, self._run.placed_posts(self._posts.rows), parameters.cut)
+            self._posts.add(equations, self._layout, self._run.placed(self._posts.points), parameters.cut)
         newest = self._layout.node_start(self._layout.last)
-        self._prior.add(equations, newest, self.state.nodes[-1])
+        self._prior.add(equations, newest, self.state.nodes[-1], self._covariance)
         self._solution = solution_of(equations)
         move = self._solution.step + _MOMENTUM * self._move
         self.state.nodes += self._nodes_of(move)
@@ -201,7 +203,6 @@ class _Batch:
         # The first step makes equal what is constant along a run and which the live path found anew at each node.
         self._move = move if self._is_begun else np.zeros_like(move)
         self._is_begun = True
-        self._prior.learn(newest, self.state.nodes[-1], self._covariance)
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
@@ -222,7 +223,7 @@ class _Batch:
         mean = np.append(odometry.first_node(), parameters.run_mean(self._run.log))
         deviations = np.append(odometry.first_deviations(), parameters.run_deviations(self._run.log))
         equations.add_prior(self._layout.with_run(np.array([0]))[0], value, mean, deviations)
-        odometry.add_steps(equations, self._layout.step_starts, self.state.nodes, self._motion)
+        equations.add(*odometry.steps(self._layout.step_starts, self.state.nodes, self._motion))
         if self._fixed_steps is not None:
             now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
             _add_fixed_steps(equations, self._layout, now, fixed)
@@ -231,8 +232,7 @@ class _Batch:
     def met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         parameters = self._parameters
-        rows = self._run.log.surfaces.rows(0, self._layout.last)
-        _, (points,) = across_weak([self._run.placed(rows)], parameters)
+        _, (points,) = across_weak([self._run.placed(self._points)], parameters)
         if self._lists is None:
             self._lists = Neighbours(points, parameters.group_scans)
         met = met_with([self._lists], points, [points], parameters.cut, parameters)
@@ -297,4 +297,5 @@ def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndar
     errors = np.diff(places - fixed, axis=0)
     for axis in (0, 1):
         jacobian = np.tile([-1.0, 1.0], (count, 1))
-        equations.add(columns[:, :, axis], jacobian, errors[:, axis], np.full(count, _FIXED_STEP**-2.0))
+        weights = np.full(count, _FIXED_STEP**-2.0)
+        equations.add(Residuals(columns[:, :, axis], jacobian, errors[:, axis], weights))

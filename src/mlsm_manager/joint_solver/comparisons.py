@@ -108,18 +108,19 @@ def add_comparisons(
     equations: NormalEquations, layout: Layout, met: Iterable[Comparison], parameters: SolverParameters, cut: float
 ) -> int:
     """Add the distances of points from the surfaces that they are compared with; return how many there are."""
-    count = 0
+    met = [one for one in met if len(one[0].rows)]
+    terms = []
     for pairs, sources, targets in met:
-        count += len(pairs.rows)
-        if not len(pairs.rows):
-            continue
         scans, other_scans, information, gradient = summed(pairs, sources, targets, parameters, cut)
         if parameters.normal_deviation > 0.0:
             # The parts of a turn together hear walls on all sides, each part alone perhaps one.
             turns = scans // parameters.parts_per_turn
             information, gradient = discounted(information, gradient, turns, _PLACES, parameters.normal_deviation)
+        terms.append((scans, other_scans, information, gradient))
+    if terms:
+        scans, other_scans, information, gradient = (np.concatenate(each) for each in zip(*terms))
         equations.add_terms(_columns(scans, other_scans, layout), information, gradient)
-    return count
+    return sum(len(pairs.rows) for pairs, _, _ in met)
 
 
 def summed(
@@ -172,14 +173,15 @@ _CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by 
 class PostComparisons:
     """Comparisons of echoes that stand alone, as of posts, in free scans with those of all others in view.
 
-    They are compared along the line of sight and across it. rows: of these echoes in the table of posts.
+    They are compared along the line of sight and across it. points: these echoes and the scan of each.
     """
 
     def __init__(
         self, posts: PointTable, parameters: SolverParameters, scans: np.ndarray, importance: np.ndarray
     ) -> None:
         """scans: (s,) those in view, ascending. importance: (s,) factors of what is compared with them."""
-        self.rows, counts = posts.rows_of(scans)
+        rows, counts = posts.rows_of(scans)
+        self.points = posts.points(rows)
         self._importance = parameters.post_confidence * np.repeat(importance, counts)
         self._parameters = replace(parameters, normal_deviation=0.0)
         self._lists: Optional[Neighbours] = None

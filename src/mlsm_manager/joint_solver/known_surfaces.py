@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.surface_points import LEAST_REACH, surface_normals
-from mlsm_manager.surface_map.blocks import cell_keys, cells_of
+from mlsm_manager.surface_map.blocks import cell_keys, cells_of, keys_of
 
 _CANDIDATES = 3  # blocks that are looked at for each point: more than there usually are as near as the nearest one
 _SQUARE = 32.0
@@ -28,7 +28,7 @@ class KnownSurfaces:
 
     def __init__(self, places: np.ndarray) -> None:
         """places: (n, 2) m, x y of the blocks' means in map."""
-        keys = cell_keys(cells_of(places, _SQUARE))
+        keys = keys_of(places, _SQUARE)
         order = np.argsort(keys, kind="stable")
         self.places, self._keys = places[order], keys[order]
         self._low, self._high = np.full(2, np.inf), np.full(2, -np.inf)

@@ -31,7 +31,7 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.weak_directions import across_weak
-from node_support.geometry import composed, inverse
+from node_support.geometry import move_of
 
 _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
 _FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
@@ -73,7 +73,7 @@ def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> Fro
     importance[known] = fading(distances, solution.parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
     rows, _ = log.surfaces.rows_of((numbers[:, np.newaxis] * scans + np.arange(scans)).ravel())
-    points = solution.placed(rows)
+    points = solution.placed(log.surfaces.points(rows))
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
     return FrozenMap(points, per_point, numbers, importance[numbers], solution.state.run.copy())
 
@@ -146,7 +146,7 @@ class LiveWindow:
         self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
-        self._recent_rows = self._log.surfaces.rows(self._recent, last)
+        self._recent_points = self._log.surfaces.points(self._log.surfaces.rows(self._recent, last))
         self._starts, self._newest_start = self._layout.step_starts, self._layout.node_start(last)
         self._believed_columns = self._layout.with_run(np.array([first]))[0]
         self._motion = self._log.node_motion(np.arange(first, last + 1))
@@ -196,34 +196,34 @@ class LiveWindow:
 
     def _step(self, cut: float, bend: Optional[Bend] = None) -> None:
         """Take one Gauss-Newton step with points up to `cut` [m] apart; the loops of a bend pull."""
-        equations = NormalEquations(self._layout.size, len(self._held_covariance))
-        self._add_beliefs(equations)
-        free = self._state.nodes[self._layout.first :]
-        self._odometry.add_steps(equations, self._starts, free, self._motion)
+        equations = self._expected()
         if self._run.fixes.by_node:
-            self._run.fixes.add(equations, self._layout, self._motion.poses, free)
+            self._run.fixes.add(equations, self._layout, self._motion.poses, self._state.nodes[self._layout.first :])
         met = self._surfaces_met(cut)
         self._comparisons = add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:
-            self._comparisons += self._posts.add(equations, self._layout, self._run.placed_posts(self._posts.rows), cut)
-        self._prior.add(equations, self._newest_start, self._state.nodes[-1])
+            self._comparisons += self._posts.add(equations, self._layout, self._run.placed(self._posts.points), cut)
+        self._prior.add(equations, self._newest_start, self._state.nodes[-1], self._own_covariance)
         if bend is not None:
             add_loops(equations, self._layout, bend.loops, self._state.nodes, bend.start)
         self._solution = DenseSolution(equations)
         self._move(self._solution.step)
-        self._prior.learn(self._newest_start, self._state.nodes[-1], self._own_covariance)
 
     def _own_covariance(self, columns: np.ndarray) -> np.ndarray:
         """Return the covariance (k, k) of unknowns (k,) if the frozen map had no error."""
         return self._solution.covariances(columns[np.newaxis], self._held_covariance)[1][0]
 
-    def _add_beliefs(self, equations: NormalEquations) -> None:
+    def _expected(self) -> NormalEquations:
+        """Return what is expected of the free unknowns without any echo."""
         layout, (mean, deviations), held = self._layout, self._beliefs, ()
+        equations = NormalEquations(layout.size, len(self._held_covariance))
         value = np.append(self._state.nodes[layout.first], self._state.run)
         if layout.first:
             mean = np.append(value[POSE], mean[POSE_COLUMNS:])
             held = layout.size + len(self._held_covariance) - POSE_COLUMNS + np.arange(POSE_COLUMNS)
         equations.add_prior(self._believed_columns, value, mean, deviations, held)
+        equations.add(*self._odometry.steps(self._starts, self._state.nodes[layout.first :], self._motion))
+        return equations
 
     def _beliefs_before(self, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
         """Return mean and deviations, (width + 2,) each, of the run's first node and of the run's unknowns."""
@@ -255,7 +255,7 @@ class LiveWindow:
         Neighbours are looked up once for all steps.
         """
         parameters = self._parameters
-        placed = self._frozen.moved_by_run(self._state.run), self._run.placed(self._recent_rows)
+        placed = self._frozen.moved_by_run(self._state.run), self._run.placed(self._recent_points)
         weak, (frozen, recent) = across_weak(placed, parameters)
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         self._lists = self._lists or [Neighbours(one, self._scans_per_group) for one in (frozen, recent)]
@@ -277,11 +277,8 @@ class LiveWindow:
 
     def log_likelihood(self) -> float:
         """Return that of the free nodes: of echoes on surfaces, less that of odd motions."""
-        equations = NormalEquations(self._layout.size, len(self._held_covariance))
-        self._add_beliefs(equations)
-        self._odometry.add_steps(equations, self._starts, self._state.nodes[self._layout.first :], self._motion)
         met = self._surfaces_met(self._parameters.cut)
-        return sum(support(*some, self._parameters) for some in met) - 0.5 * equations.cost
+        return sum(support(*some, self._parameters) for some in met) - 0.5 * self._expected().cost
 
     @property
     def oldest(self) -> int:
@@ -306,7 +303,7 @@ class LiveWindow:
         share, distance, surfaces = agreement(self._met, number - 1, self._parameters)
         return LiveEstimate(
             time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
-            T_map_odom=composed(T_map_base, inverse(T_odom_base)), node=node, run=self._state.run.copy(),
+            T_map_odom=move_of(T_odom_base, T_map_base), node=node, run=self._state.run.copy(),
             covariance=covariance, own_covariance=own_covariance,
             world_scale_deviation=self._parameters.world_scale_deviation(self._log),
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),

@@ -12,7 +12,7 @@ from typing import List, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.map_support import Surfaces
-from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, State
+from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, Residuals, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, PlaceCandidate, best_place
@@ -54,7 +54,7 @@ def loops_of(solution: Solution) -> List[Loop]:
     log, parameters = solution.log, solution.parameters
     if parameters.parts_per_turn > 1:
         return []
-    points = solution.placed(log.surfaces.rows(0, log.scan_count))
+    points = solution.placed(log.surfaces.points(log.surfaces.rows(0, log.scan_count)))
     found = [_loop(points, scan, parameters) for scan in range(APART, log.scan_count)]
     return agreed([loop for loop in found if loop is not None])
 
@@ -80,7 +80,7 @@ def add_loops(
         now, then = (some[ends[:, 0], axis] - some[ends[:, 1], axis] for some in (nodes, start.nodes))
         jacobian = np.tile([1.0, -1.0], (len(loops), 1))
         weight = np.full(len(loops), _DEVIATION**-2.0)
-        equations.add(columns[:, :, axis], jacobian, now - then - shifts[:, axis], weight)
+        equations.add(Residuals(columns[:, :, axis], jacobian, now - then - shifts[:, axis], weight))
 
 
 def _confirms(other: Loop, loop: Loop) -> bool:
@@ -126,13 +126,14 @@ def with_newest(solution: Solution, before: Sequence[Loop]) -> Tuple[Loop, ...]:
     """Return the loops found `before` that the newest scan may confirm, and its own where it has one."""
     scan, parameters = solution.log.scan_count - 1, solution.parameters
     kept = tuple(loop for loop in before if loop.scan >= scan - NEIGHBOURS)
-    own = solution.log.surfaces.rows(scan, scan + 1)
+    surfaces = solution.log.surfaces
+    own = surfaces.rows(scan, scan + 1)
     in_turn = scan % _EVERY == 0 or len(kept) > 0
     if not in_turn or scan < APART or len(own) < FEWEST_POINTS:
         return kept
-    sources = solution.placed(own[:: max(1, len(own) // MOST_POINTS)])
-    rows, _ = solution.log.surfaces.rows_of(_landmarks(solution, *reach_of(sources)))
-    older = solution.placed(rows)
+    sources = solution.placed(surfaces.points(own[:: max(1, len(own) // MOST_POINTS)]))
+    rows, _ = surfaces.rows_of(_landmarks(solution, *reach_of(sources)))
+    older = solution.placed(surfaces.points(rows))
     loop = loop_of(sources, older, scan, parameters) if len(older) else None
     return kept if loop is None else (*kept, loop)
 

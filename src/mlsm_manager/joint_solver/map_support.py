@@ -149,12 +149,13 @@ def agreement(met: Sequence[Comparison], scan: int, parameters: SolverParameters
 
 
 def _share(solution: Solution, turn: int) -> float:
-    log, parts = solution.log, solution.parameters.parts_per_turn
-    before = log.surfaces.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
-    own = log.surfaces.rows(parts * turn, parts * (turn + 1))
+    heard, parts = solution.log.surfaces, solution.parameters.parts_per_turn
+    before = heard.rows(parts * max(0, turn - _TURNS_BEFORE), parts * turn)
+    own = heard.rows(parts * turn, parts * (turn + 1))
     if not len(before) or not len(own):
         return np.nan
-    sources, surfaces = solution.placed(own), Surfaces(solution.placed(before), solution.parameters)
+    sources, targets = (solution.placed(heard.points(rows)) for rows in (own, before))
+    surfaces = Surfaces(targets, solution.parameters)
     distances = surfaces.distances(sources, sources.places[np.newaxis], _SURROUNDINGS, _CANDIDATES)[0]
     known = np.isfinite(distances)
     total = sources.qualities[known].sum()

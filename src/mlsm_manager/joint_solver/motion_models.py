@@ -5,11 +5,11 @@ velocity_models those of which the velocity is unknown.
 """
 
 from dataclasses import dataclass, replace
-from typing import Callable, Dict, Mapping, NamedTuple, Optional, Protocol, Tuple
+from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Protocol, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.normal_equations import POSE, YAW, NormalEquations
+from mlsm_manager.joint_solver.normal_equations import POSE, YAW, NormalEquations, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.prior_mixture import PriorMixture
 from mlsm_manager.scan_matching.prediction import Fading
@@ -82,8 +82,8 @@ class OdometryModel(Protocol):
     def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
         """Return the unknowns (n, width) expected one step of `motion` (n + 1) after each of `nodes` (n, width)."""
 
-    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
-        """Add what ties n `nodes` (n, width) together; starts: (n - 1,) columns of all but the last. motion: (n)."""
+    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+        """Return what ties n `nodes` (n, width) together; starts: (n - 1,) columns of all but the last. motion: (n)."""
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         """Return the complex factors (n,) of the reference path after `nodes` (n, width)."""
@@ -113,7 +113,7 @@ class Transition(NamedTuple):
     def of(cls, odometry: OdometryModel, nodes: np.ndarray, motion: Motion) -> "Transition":
         """Return that from the first to the second of `nodes` (2, width), where the odometry reported `motion` (2)."""
         equations = NormalEquations(2 * odometry.width)
-        odometry.add_steps(equations, np.zeros(1, dtype=np.int64), nodes, motion)
+        equations.add(*odometry.steps(np.zeros(1, dtype=np.int64), nodes, motion))
         information, _ = equations.dense()
         here, there = slice(0, odometry.width), slice(odometry.width, 2 * odometry.width)
         noise = np.linalg.inv(information[there, there])
@@ -161,11 +161,11 @@ class Compass:
         return replace(self, heading_deviation=_FREED_HEADING, heading_correlation_time=_FREED_TIME)
 
 
-def add_changes(
-    equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, times: np.ndarray,
+def changes_of(
+    starts: np.ndarray, nodes: np.ndarray, times: np.ndarray,
     walks: Mapping[int, float], changes: Mapping[int, Change], compass: Optional[Compass],
-) -> None:  # fmt: skip
-    """Add how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width), at `times` [s].
+) -> Residuals:  # fmt: skip
+    """Return how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width) at `times` [s].
 
     Both by columns of a node. walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others.
     compass: that of which YAW is the error; None without one.
@@ -181,4 +181,4 @@ def add_changes(
     jacobian = np.stack([np.ones_like(kept), -kept], axis=-1)
     weight = 1.0 / np.maximum(variances, _CONSTANT_DEVIATION**2)
     residual = values[:, 1:] - kept * values[:, :-1]
-    equations.add(places.reshape(-1, 2), jacobian.reshape(-1, 2), residual.ravel(), weight.ravel())
+    return Residuals(places.reshape(-1, 2), jacobian.reshape(-1, 2), residual.ravel(), weight.ravel())

@@ -5,7 +5,7 @@ pose plus x, y and yaw. An odometry model may add columns of its own. The run's 
 """
 
 from dataclasses import dataclass, field
-from typing import Sequence, Tuple, Union
+from typing import NamedTuple, Sequence, Tuple, Union
 
 import numpy as np
 import scipy.linalg
@@ -89,6 +89,19 @@ took 0.6 s of CPU time, a sparse solution 3.4 s and 1.2 GB."""
 _HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 
 
+class Residuals(NamedTuple):
+    """m residuals of c unknowns each.
+
+    columns: (m, c) int, of each residual's unknowns, negative for constants. jacobian: (m, c). values, weights: (m,); a
+    weight is the inverse of the variance.
+    """
+
+    columns: np.ndarray
+    jacobian: np.ndarray
+    values: np.ndarray
+    weights: np.ndarray
+
+
 class NormalEquations:
     """information @ step = -gradient of `size` free unknowns; after them come the columns of `held` ones."""
 
@@ -100,17 +113,14 @@ class NormalEquations:
         self._columns = []
         self._terms = []
 
-    def add(self, columns: np.ndarray, jacobian: np.ndarray, residual: np.ndarray, weight: np.ndarray) -> None:
-        """Add m residuals of c columns each.
-
-        columns: (m, c) int, of each residual's unknowns, negative for constants. jacobian: (m, c).
-        residual, weight: (m,); the weight is the inverse of the variance.
-        """
-        weighted = weight[:, np.newaxis] * jacobian
-        self.add_terms(
-            columns, weighted[:, :, np.newaxis] * jacobian[:, np.newaxis], weighted * residual[:, np.newaxis]
-        )
-        self.cost += float(np.sum(weight * residual**2))
+    def add(self, *sets: Residuals) -> None:
+        """Add sets of residuals, one after the other."""
+        for columns, jacobian, values, weights in sets:
+            weighted = weights[:, np.newaxis] * jacobian
+            self.add_terms(
+                columns, weighted[:, :, np.newaxis] * jacobian[:, np.newaxis], weighted * values[:, np.newaxis]
+            )
+            self.cost += float(np.sum(weights * values**2))
 
     def add_prior(
         self, columns: np.ndarray, value: np.ndarray, mean: np.ndarray, deviation: np.ndarray,
@@ -122,10 +132,10 @@ class NormalEquations:
         """
         weight, pairs = np.maximum(deviation, _HELD_DEVIATION) ** -2.0, np.full((len(value), 2), -1)
         pairs[:, 0], pairs[: len(held), 1] = columns, held
-        self.add(pairs, np.tile([1.0, -1.0], (len(value), 1)), value - mean, weight)
+        self.add(Residuals(pairs, np.tile([1.0, -1.0], (len(value), 1)), value - mean, weight))
 
     def add_terms(self, columns: np.ndarray, information: np.ndarray, gradient: np.ndarray) -> None:
-        """Add m sums: columns (m, c) as in `add`, information (m, c, c), gradient (m, c)."""
+        """Add m sums: columns (m, c) as those of Residuals, information (m, c, c), gradient (m, c)."""
         columns = np.where(columns < 0, self._columns_end, columns)
         summed = np.bincount(columns.ravel(), gradient.ravel(), self._columns_end + 1)[: self.size]
         self.gradient = self.gradient + summed

@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.odometry.steps import seconds_untold
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse
+from node_support.geometry import seen_from
 
 _FIRST_CAPACITY = 256
 _GROWTH = 5  # quarters: memory of a long run is dearer than copying
@@ -175,7 +175,7 @@ class OdometryLog:
     def velocity_at(self, time: float) -> np.ndarray:
         """Return the (3,) velocity in base_link, m/s, m/s, rad/s, over the second that ends at `time` [s]."""
         before, after = self.at(np.array([time - _WINDOW, time]))
-        return composed(inverse(before), after) / _WINDOW
+        return seen_from(before, after) / _WINDOW
 
     def motion(self, times: np.ndarray) -> Motion:
         """Return the motion at `times` (m,), as `at` does."""

@@ -175,7 +175,8 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     )
     if not len(before) or not len(own):
         return newest
-    search = _Search(solution, Surfaces(solution.placed(before), solution.parameters), own)
+    targets = solution.placed(log.surfaces.points(before))
+    search = _Search(solution, Surfaces(targets, solution.parameters), own)
     if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
         state, step = search.turned(state, step)
     return search.beside(state, step, MOST_POINTS)[1]
@@ -217,7 +218,7 @@ def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
 
 def _best_place(solution: Solution, rows: np.ndarray, covariance: np.ndarray) -> PlaceCandidate:
     """Return where in the map the points in `rows` fit best."""
-    sources = solution.placed(rows)
+    sources = solution.placed(solution.log.surfaces.points(rows))
     targets = _map_around(solution, sources, REACH * widest(covariance) + solution.parameters.cut)
     return best_place(covariance, sources, Surfaces(targets, solution.parameters))
 
@@ -235,7 +236,7 @@ class _Search(NamedTuple):
         step: covariance (width, width) of the node. most: points of the scan that are compared.
         """
         solution, parameters = self.solution.with_state(state), self.solution.parameters
-        sources = solution.placed(self.own[:: max(1, len(self.own) // most)])
+        sources = solution.placed(solution.log.surfaces.points(self.own[:: max(1, len(self.own) // most)]))
         shifts = places_within(step[:2, :2], _MOST_CELLS_BESIDE)
         support = self.surfaces.support(sources, _with_ends_moved(sources, shifts))
         found = POINT_WEIGHT * MOST_POINTS / most * support
@@ -269,9 +270,9 @@ def _with_ends_moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
 
 def _post_support(solution: Solution, shifts: np.ndarray) -> np.ndarray:
     """Return how many of the newest scan's echoes of posts (k,) lie on earlier ones; see _with_ends_moved."""
-    last, rows = solution.log.scan_count, solution.log.posts.rows
-    sources = solution.placed_posts(rows(last - 1, last))
-    targets = solution.placed_posts(rows(max(0, last - 1 - _COMPARED_SCANS), last - 1))
+    last, posts = solution.log.scan_count, solution.log.posts
+    of_scans = (last - 1, last), (max(0, last - 1 - _COMPARED_SCANS), last - 1)
+    sources, targets = (solution.placed(posts.points(posts.rows(*each))) for each in of_scans)
     if not len(sources) or not len(targets):
         return np.zeros(len(shifts))
     places = _with_ends_moved(sources, shifts)
@@ -312,7 +313,7 @@ def _map_around(solution: Solution, sources: PlacedPoints, reach: float) -> Plac
         return sources
     scans = np.flatnonzero(solution.submaps.numbers == MAP)
     rows, _ = solution.log.surfaces.rows_of(scans[scans != sources.scans[-1]])
-    targets = solution.placed(rows)
+    targets = solution.placed(solution.log.surfaces.points(rows))
     low, high = sources.places.min(axis=0) - reach, sources.places.max(axis=0) + reach
     targets = targets.selected(((targets.places >= low) & (targets.places <= high)).all(axis=1))
     return targets if solution.known is None else targets.joined_with(solution.known.around(low, high))

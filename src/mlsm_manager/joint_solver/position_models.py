@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, fields, replace
 from operator import attrgetter
-from typing import Dict, NamedTuple
+from typing import Dict, Iterator, List, NamedTuple
 
 import numpy as np
 
@@ -17,9 +17,9 @@ from mlsm_manager.joint_solver.motion_models import (
     Compass,
     Drift,
     OdometryModel,
-    add_changes,
+    changes_of,
 )
-from mlsm_manager.joint_solver.normal_equations import YAW, NormalEquations
+from mlsm_manager.joint_solver.normal_equations import YAW, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, product, stretched
 from mlsm_manager.joint_solver.prior_mixture import PriorComponent, PriorMixture
 
@@ -112,20 +112,17 @@ class DvlFactors(OdometryModel):
         slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
         return Drift(values, slopes)
 
-    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
-        durations = np.diff(motion.times)
-        self._add_positions(equations, starts, nodes, motion, durations)
-        add_changes(equations, starts, nodes, motion.times, self._walks, {}, self.compass)
+    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+        changes = changes_of(starts, nodes, motion.times, self._walks, {}, self.compass)
+        return [*self._positions(starts, nodes, motion), changes]
 
-    def _add_positions(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion, durations: np.ndarray
-    ) -> None:
-        """Add the steps. While positions are held nobody knows how far the vehicle goes.
+    def _positions(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> Iterator[Residuals]:
+        """Yield the steps in x and in y. While positions are held nobody knows how far the vehicle goes.
 
         Noise is one of the reported velocities, so the residuals are those per unit of scale. The derivative by the
         scale contains that; else the fit would shrink the world to make them smaller.
         """
-        step, before = np.diff(motion.positions), nodes[:-1]
+        step, before, durations = np.diff(motion.positions), nodes[:-1], np.diff(motion.times)
         one = np.ones(len(starts))
         yaw = (before[:, YAW] + nodes[1:, YAW]) / 2.0
         turned_step = product(np.exp(1j * (before[:, DIRECTION] + yaw)), step)
@@ -140,7 +137,7 @@ class DvlFactors(OdometryModel):
             slopes = (one, -one, by_angle, -part(turned_step) - residual, by_angle / 2.0, by_angle / 2.0)
             slopes += (-durations,) * self._carriers
             columns = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *carriers)
-            equations.add(starts[:, np.newaxis] + np.array(columns), np.column_stack(slopes), residual, weight)
+            yield Residuals(starts[:, np.newaxis] + np.array(columns), np.column_stack(slopes), residual, weight)
 
 
 class ThrusterFactors(DvlFactors):

@@ -145,25 +145,25 @@ class AdaptedPrior:
     def __init__(self, mixture: Optional[PriorMixture], term: Optional[PriorTerm]) -> None:
         """term: to begin with; None for what is known without any echo."""
         self._mixture, self.term = mixture, PriorTerm.none(0)
+        self._is_added = False
         if mixture is not None:
             self.term = term or mixture.judged(mixture.before).term
-            self._next = self.term
 
-    def add(self, equations: NormalEquations, start: int, node: np.ndarray) -> None:
-        """Add the term to the unknowns of a node (width,) in the columns from `start` on."""
-        if self._mixture is not None:
-            self.term, own = self._next, np.array(self._mixture.columns)
-            self.term.add(equations, start + own, node[own])
+    def add(
+        self, equations: NormalEquations, start: int, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]
+    ) -> None:
+        """Add what follows from the step before to the unknowns of a node (width,) in the columns from `start` on.
 
-    def learn(self, start: int, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]) -> None:
-        """Learn from the step with the present term, after which the node is `node` (width,).
-
-        covariance: from columns (k,) to theirs (k, k).
+        covariance: from columns (k,) to theirs after that step (k, k).
         """
-        if self._mixture is not None:
-            own = np.array(self._mixture.columns)
+        if self._mixture is None:
+            return
+        own = np.array(self._mixture.columns)
+        if self._is_added:
             found = Gaussian(node[own], covariance(start + own))
-            self._next = self._mixture.judged(self.term.removed_from(found)).term
+            self.term = self._mixture.judged(self.term.removed_from(found)).term
+        self._is_added = True
+        self.term.add(equations, start + own, node[own])
 
 
 def _term_between(known: Gaussian, wanted: Gaussian) -> PriorTerm:

@@ -13,7 +13,8 @@ from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import NO_POINTS, PlacedPoints, path_rows, placed_rows
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
-from mlsm_manager.joint_solver.run_log import PointTable, RunLog
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.surface_points import SurfacePoints
 from node_support.geometry import inverse, transformed
 
 _HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
@@ -189,26 +190,21 @@ class Solution:
         """Move the newest nodes by `shares` (k,) of a shift (2,) m."""
         self.state.nodes[-len(shares) :, :2] += np.outer(shares, shift)
 
-    def placed(self, rows: np.ndarray) -> PlacedPoints:
-        """Return the surface points in `rows` (n,) int of the log in the map."""
-        return self._placed(self.log.surfaces, rows)
+    def placed(self, heard: Tuple[SurfacePoints, np.ndarray]) -> PlacedPoints:
+        """Return points and the scan of each, as the log's tables have them, in the map.
 
-    def placed_posts(self, rows: np.ndarray) -> PlacedPoints:
-        """Return the echoes of posts in `rows` (n,) int of the log's table of these."""
-        return self._placed(self.log.posts, rows)
-
-    def _placed(self, table: PointTable, rows: np.ndarray) -> PlacedPoints:
-        """Return points of a table in the map, from the path between the two nodes of the scan that heard each."""
-        if not len(rows):
+        They follow from the path between the two nodes of the scan that heard each.
+        """
+        (points, scans), log, state = heard, self.log, self.state
+        if not len(scans):
             return NO_POINTS
-        (points, scans), log, state = table.points(rows), self.log, self.state
         times = points.times + state.run[DELAY]
         nodes = np.unique(np.concatenate([scans, scans + 1]))
-        heard = times, np.searchsorted(nodes, scans), points.ranges, points.bearings
+        sights = times, np.searchsorted(nodes, scans), points.ranges, points.bearings
         around = times.min() - _HALF_SECOND, times.max() + _HALF_SECOND
         legs, knots = _path(log.odometry, self.odometry, log.node_times[nodes], state.nodes[nodes], around)
         scale = float(state.run[RANGE_SCALE])
-        found = placed_rows(heard, points.normals, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
+        found = placed_rows(sights, points.normals, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
         return PlacedPoints(
             scans=scans, places=found[:, 0:2], arms=found[:, 2:4], normals=found[:, 4:6], slants=points.slants,
             qualities=points.qualities, shares=found[:, 10], by_run=found[:, 6:10].reshape(-1, 2, 2),

@@ -1,7 +1,7 @@
 """Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, Dict
+from typing import Callable, Dict, Iterator, List
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from mlsm_manager.joint_solver.motion_models import (
     Compass,
     Drift,
     OdometryModel,
-    add_changes,
+    changes_of,
 )
-from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations
+from mlsm_manager.joint_solver.normal_equations import YAW, Layout, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
 from mlsm_manager.scan_matching.prediction import Fading
 from node_support.geometry import harmonics
@@ -126,12 +126,11 @@ class HeadingFactors(OdometryModel):
             np.array([own.speed_correlation_time, own.slip_correlation_time, np.inf]),
         )
 
-    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
-        durations = np.diff(motion.times)
-        self._add_positions(equations, starts, nodes, motion)
-        walks = {TRAVEL: self._speeds.travel_walk}
-        add_changes(equations, starts, nodes, motion.times, walks, self._changes(durations), self.compass)
-        self._add_speeds_ahead(equations, starts, nodes, durations)
+    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+        durations, walks = np.diff(motion.times), {TRAVEL: self._speeds.travel_walk}
+        changes = changes_of(starts, nodes, motion.times, walks, self._changes(durations), self.compass)
+        ahead = self._speeds_ahead(starts, nodes, durations)
+        return [*self._positions(starts, nodes, motion), changes, ahead]
 
     def _first_heading(self) -> float:
         return self.compass.heading_deviation
@@ -147,17 +146,15 @@ class HeadingFactors(OdometryModel):
         _, slipping = self._kept(durations)
         return {ASIDE: Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))}
 
-    def _add_speeds_ahead(
-        self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray
-    ) -> None:
+    def _speeds_ahead(self, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray) -> Residuals:
         own, (kept, _) = self._speeds, self._kept(durations)
         columns = starts[:, np.newaxis] + np.array([self.width + AHEAD, AHEAD, TRAVEL])
         jacobian = np.column_stack([np.ones(len(starts)), -kept, kept - 1.0])
         residual = nodes[1:, AHEAD] - kept * nodes[:-1, AHEAD] - (1.0 - kept) * nodes[:-1, TRAVEL]
         weight = 1.0 / np.maximum(own.speed_deviation**2 * (1.0 - kept**2), HELD_DEVIATION**2)
-        equations.add(columns, jacobian, residual, weight)
+        return Residuals(columns, jacobian, residual, weight)
 
-    def _add_positions(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
+    def _positions(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> Iterator[Residuals]:
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         speeds = self.gain(nodes)
         ahead = product(np.exp(1j * yaw), np.diff(self.reference(motion)))
@@ -170,7 +167,7 @@ class HeadingFactors(OdometryModel):
             by_node = [-part(ahead) / 2.0, -part(1j * ahead) / 2.0, -part(1j * step) / 2.0]
             jacobian = np.column_stack([one, -one, *by_node, *by_node])
             columns = starts[:, np.newaxis] + places
-            equations.add(columns, jacobian, part(residual), weight)
+            yield Residuals(columns, jacobian, part(residual), weight)
 
     def _step_variance(self, durations: np.ndarray) -> np.ndarray:
         """Return the variances (n,) [m^2] of steps whose speeds at both ends are known, in each direction."""
@@ -229,8 +226,7 @@ class UnaidedFactors(HeadingFactors):
         turn_rate = Change(kept, self._own.turn_rate_deviation**2 * (1.0 - kept**2))
         return {TURN_RATE: turn_rate, **super()._changes(durations)}
 
-    def add_steps(self, equations: NormalEquations, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> None:
-        super().add_steps(equations, starts, nodes, motion)
+    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
         own, durations = self._own, np.diff(motion.times)
         places = np.array([self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE])
         one, half = np.ones(len(starts)), durations / 2.0
@@ -240,7 +236,8 @@ class UnaidedFactors(HeadingFactors):
         )
         weight = 1.0 / (short + own.heading_walk**2 * durations)
         jacobian = np.column_stack([one, -one, -half, -half])
-        equations.add(starts[:, np.newaxis] + places, jacobian, residual, weight)
+        turn = Residuals(starts[:, np.newaxis] + places, jacobian, residual, weight)
+        return [*super().steps(starts, nodes, motion), turn]
 
 
 def _bridged(deviation: float, time: float, durations: np.ndarray) -> np.ndarray:

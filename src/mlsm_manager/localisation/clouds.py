@@ -1,13 +1,13 @@
-"""Points with the times of their beams, and where those that come beside the scans lie in map."""
+"""Where clouds lie in map that come beside the scans."""
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Optional, Protocol, Sequence, Tuple
+from typing import Deque, Optional, Protocol, Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import composed, inverse, transformed
+from mlsm_manager.scan_matching.scan import MapCloud, Track
+from node_support.geometry import move_of, transformed
 
 PATH_POINTS = 17
 """Points of the path within a scan: about one per second of a slow head's revolution."""
@@ -15,37 +15,6 @@ _MOST_STRETCHES = 8
 """A cloud comes within a scan or two of its own; eight turns of a head are two minutes."""
 _SLACK = 0.5
 """s by which a cloud may reach beyond the scans that are known: a few beams, in which a vehicle moves decimetres."""
-
-
-@dataclass(frozen=True)
-class MapCloud:
-    """points: (n, 4) float64, x y z [m] in odom and echo strength. times: (n,) s. end: s, stamp of the newest beam."""
-
-    points: np.ndarray
-    times: np.ndarray
-    end: float
-
-    @classmethod
-    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "MapCloud":
-        """Build from a cloud's points (n, 4) and signed time stamps (n,); points that are not finite are left out."""
-        points = np.asarray(points, dtype=np.float64)
-        stamps = np.asarray(time_stamps, dtype=np.float64)
-        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
-        return cls(points[valid], np.abs(stamps[valid]), end)
-
-    @classmethod
-    def of_scan(cls, scan: Scan) -> "MapCloud":
-        """Return the points of a scan."""
-        return cls(scan.points, scan.times, scan.reference_time)
-
-    @classmethod
-    def joined(cls, clouds: "Sequence[MapCloud]") -> "MapCloud":
-        """Return the points of clouds (at least one), one after the other, as one cloud."""
-        points, times = ([getattr(cloud, name) for cloud in clouds] for name in ("points", "times"))
-        return cls(np.concatenate(points), np.concatenate(times), max(cloud.end for cloud in clouds))
-
-    def __len__(self) -> int:
-        return len(self.points)
 
 
 class Placement(Protocol):
@@ -84,7 +53,7 @@ class CorrectionHistory:
 
     def add(self, times: np.ndarray, poses: np.ndarray, track: Track, holds: bool) -> None:
         """Add the path T_map_base `poses` (b, 3) at increasing `times` (b,)."""
-        corrections = composed(poses, inverse(track.at(times)))
+        corrections = move_of(track.at(times), poses)
         self._stretches.append(_Stretch(times, corrections, poses, holds))
 
     def placed(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:

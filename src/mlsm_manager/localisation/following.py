@@ -8,18 +8,17 @@ from typing import Callable, Deque, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.odometry.mending import with_trembling_smoothed
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, advanced, advanced_path, carried_on
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import MapCloud, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION, RATE
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.live_causes import LiveCauses
-from node_support.geometry import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, move_of, seen_from, transformed, wrapped
 from node_support.timing import UsualInterval
 
 # Of the odometry: a minute at 60 per second, longer than a scan and its match take.
@@ -74,7 +73,7 @@ class LiveCorrection:
                 track = Track(times, np.array([pose for _, pose in known]))
                 self._bring_on(start, track, times[times > start])
             if self._shown is not None and self._samples:
-                self._jump = composed(inverse(self._state[POSE]), self._shown)
+                self._jump = seen_from(self._state[POSE], self._shown)
                 self._jump[2] = wrapped(self._jump[2])
                 self._jump_time = None
 
@@ -187,7 +186,7 @@ class Following:
         self._came = scan.reference_time, self._clock()
         if trembling:
             odometry.trembling = odometry.trembling or trembling
-            moves = composed(smooth.at(scan.times), inverse(scan.track.at(scan.times)))
+            moves = move_of(scan.track.at(scan.times), smooth.at(scan.times))
             scan = replace(scan, points=transformed(moves, scan.points), track=smooth)
         odometry.take(scan.track)
         if not odometry.steps:

@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Fix, Solution
-from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
+from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.joint_session import (
     JointSession,
@@ -24,7 +24,7 @@ from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, ReportedMotion, Scan, Track
+from mlsm_manager.scan_matching.scan import MapCloud, Matcher, MatchResult, ReportedMotion, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource

@@ -15,15 +15,15 @@ from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Fix, Solution
-from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
+from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
-from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan, Track
+from mlsm_manager.scan_matching.scan import MapCloud, MatchResult, MatchStatus, Prior, Scan, Track
 from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
 from mlsm_manager.self_check.map_checks import AGREES, in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import odometry_decided, position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
-from node_support.geometry import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, move_of, transformed, wrapped
 
 _LONGEST_PAUSE = 2.0
 """Usual durations of a scan between two scans: fewer may be a turn that was lost."""
@@ -285,7 +285,7 @@ def prior_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Prior:
 
 def correction_of(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
     """Return T_map_odom (3,) that puts the end of a scan to T_map_base (3,)."""
-    correction = composed(T_map_base, inverse(scan.reference_pose))
+    correction = move_of(scan.reference_pose, T_map_base)
     correction[2] = wrapped(correction[2])
     return correction
 

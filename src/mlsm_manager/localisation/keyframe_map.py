@@ -7,11 +7,11 @@ from typing import Deque, Dict, List, Mapping, Optional
 import numpy as np
 
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.localisation.clouds import MapCloud, Placement
+from mlsm_manager.localisation.clouds import Placement
 from mlsm_manager.localisation.joint_session import JointSession
-from mlsm_manager.localisation.keyframe_carving import MOST_FOLLOWED, KeyframeCarving
+from mlsm_manager.localisation.keyframe_traces import MOST_FOLLOWED, KeyframeCarving, Stretches
 from mlsm_manager.localisation.resumption import StoredRun
-from mlsm_manager.localisation.stretches import Stretches
+from mlsm_manager.scan_matching.scan import MapCloud
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.free_space import Carver, CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport, blocks_of

@@ -11,7 +11,6 @@ import numpy as np
 
 from georeferencing.origin import STORED, Origin
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.joint_session import belief_at
@@ -21,14 +20,14 @@ from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, Scan, Track
+from mlsm_manager.scan_matching.scan import MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.block_store import finished
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, inverse
+from node_support.geometry import composed, move_of
 
 # s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
 _JUMP_BACK = 30.0
@@ -214,7 +213,7 @@ class Localiser:
             belief = belief_at(np.nan, pose, self.estimator.errors)
             belief.covariance[POSE, POSE] = covariance
             self._forget_place()
-            self._expect(composed(pose, inverse(odometry)), belief)
+            self._expect(move_of(odometry, pose), belief)
 
     def _forget_place(self) -> None:
         self.estimator.forget_place()

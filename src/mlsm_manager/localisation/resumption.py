@@ -10,16 +10,15 @@ from typing import Dict, Mapping, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.run_log import stacked, unstacked
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.scan_matching.judgement import agreement
 from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import MapCloud, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, STATES
 from mlsm_manager.surface_map.blocks import ROW_WIDTH
 from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, inverse
+from node_support.geometry import seen_from
 
 # m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
 _STRAYED = np.array([1.0, 1.0, 0.1])
@@ -66,7 +65,7 @@ class StoredPlace:
         """
         if not 0.0 < track.times[0] - self.belief.time < _LONGEST_BRIDGE:
             return track
-        T_odom_base = composed(inverse(self.correction), self.belief.theta[POSE])
+        T_odom_base = seen_from(self.correction, self.belief.theta[POSE])
         times, poses = np.append(self.belief.time, track.times), np.vstack([T_odom_base, track.poses])
         return Track(times, poses)
 

@@ -4,11 +4,11 @@ from typing import Mapping
 
 import numpy as np
 
-from mlsm_manager.localisation.clouds import PATH_POINTS, MapCloud
+from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
+from mlsm_manager.scan_matching.scan import MapCloud, MatchResult, Scan, Track, corrected_points
 from mlsm_manager.scan_matching.scan_path import ERRORS
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer

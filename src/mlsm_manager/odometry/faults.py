@@ -7,7 +7,7 @@ from typing import Callable, Dict, List, Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, harmonics, inverse, rotated
+from node_support.geometry import harmonics, rotated, seen_from
 
 # rad and relative: a marina's unbroken compass errs by 3 degrees with the heading, a DVL by three times 1 percent.
 _USUAL_HEADING, _USUAL_LENGTH = np.radians(4.0), 0.04
@@ -83,7 +83,7 @@ class MotionFault:
         if self.kind is FaultKind.CARRIED:
             since = np.clip(track.times - self.begin, 0.0, self.end - self.begin)
             return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
-        steps = composed(inverse(track.poses[:-1]), track.poses[1:])
+        steps = seen_from(track.poses[:-1], track.poses[1:])
         errors = self._errors(track)
         if self.kind in OF_DISTANCES:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])

@@ -9,7 +9,7 @@ import numpy as np
 
 from mlsm_manager.odometry.faults import integrated
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import composed, inverse, wrapped
+from node_support.geometry import composed, move_of, seen_from, wrapped
 from node_support.parameters import ParameterSet, parameter
 from node_support.timing import stretches
 
@@ -141,7 +141,7 @@ class ContinuousOdometry:
     def _bridge(self, track: Track, stall: "Stall") -> None:
         """Let the odometry go on while it stalled; where it jumped afterwards, by as much as it jumped."""
         before, after = track.poses[stall.begin], track.poses[stall.end]
-        step, missed = composed(inverse(before), after), stall.missed.copy()
+        step, missed = seen_from(before, after), stall.missed.copy()
         if np.hypot(*(step - stall.usual)[:2]) > LEAST_STEP[0]:
             missed[:2] = step[:2]
         if abs(wrapped(step[2] - stall.usual[2])) > LEAST_STEP[1]:
@@ -156,7 +156,7 @@ class ContinuousOdometry:
         if number > 1 and track.times[number - 1] not in self._starts:
             duration = track.times[number - 1] - track.times[number - 2]
             share = min((track.times[number] - track.times[number - 1]) / duration, 1.0)
-            self._usual = share * composed(inverse(track.poses[number - 2]), before)
+            self._usual = share * seen_from(track.poses[number - 2], before)
         step = after - before
         # Where the last pose was a step itself its place is known better than from a large step and back.
         place = self._expected if self._starts[-1] == track.times[number - 1] else composed(self._fixes[-1], before)
@@ -170,7 +170,7 @@ class ContinuousOdometry:
         self.steps.append(Step(kind, float(times[1]), float(np.hypot(*step[:2])), float(wrapped(step[2])), lost))
         self._begins.append(float(times[0]))
         # The fix comes first: others search the starts.
-        self._fixes.append(composed(self._expected, inverse(after)))
+        self._fixes.append(move_of(after, self._expected))
         self._starts.append(float(times[1]))
 
     def goes_on_at(self, pose: np.ndarray) -> bool:
@@ -244,9 +244,9 @@ def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
     kind = StepKind.POSITIONS if np.ptp(poses[first : last + 1, 2]) else StepKind.STALLED
     if not _SHORTEST_STALL <= times[last] - times[first] < _LONGEST_STALLS[kind] or first - start < 2:
         return None
-    steps, step = composed(inverse(poses[start:first]), poses[start + 1 : first + 1]), times[last + 1] - times[last]
+    steps, step = seen_from(poses[start:first], poses[start + 1 : first + 1]), times[last + 1] - times[last]
     rates = steps / np.diff(times[start : first + 1])[:, np.newaxis]
-    usual, again = np.median(rates, axis=0), composed(inverse(poses[last]), poses[last + 1]) / step
+    usual, again = np.median(rates, axis=0), seen_from(poses[last], poses[last + 1]) / step
     stops = (_speeds(usual) > _GOES) & (_speeds(rates[-1]) > _AS_BEFORE * _speeds(usual))
     if kind is StepKind.POSITIONS:
         missed = _steered(usual * stops[0], again, times[first : last + 2], poses[first : last + 2, 2])

@@ -9,7 +9,7 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput, counted
-from node_support.geometry import composed, inverse, matrices, transformed
+from node_support.geometry import inverse, matrices, move_of, transformed
 from node_support.headers import DAY
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
@@ -61,7 +61,7 @@ class Recording:
         times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
         later = times + correction.sonar_delay
         reached = (later >= self.track.times[0]) & (later <= self.track.times[-1])
-        moves = matrices(composed(self.track.at(later), inverse(self.track.at(times))))
+        moves = matrices(move_of(self.track.at(times), self.track.at(later)))
         beams = [
             PlacedBeam(correction.corrected(placed.beam), move @ placed.T_target_sonar, placed.is_moving)
             for placed, move, kept in zip(self.beams, moves, reached)
@@ -72,7 +72,7 @@ class Recording:
     def with_track(self, track: Track) -> "Recording":
         """Return the recording with another T_odom_base, which the beams follow."""
         times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
-        moves = matrices(composed(track.at(times), inverse(self.track.at(times))))
+        moves = matrices(move_of(self.track.at(times), track.at(times)))
         return replace(self._moved(moves), track=track)
 
     def _moved(self, moves: np.ndarray) -> "Recording":

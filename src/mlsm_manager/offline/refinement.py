@@ -11,11 +11,10 @@ from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Solution, solved_path
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.replay import Replayed
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import MapCloud, Track
 from mlsm_manager.self_check.causes import Fault
 from mlsm_manager.self_check.motion_findings import MotionFindings, motion_findings
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree

@@ -21,7 +21,7 @@ from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.map_file import StoredMap
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, inverse
+from node_support.geometry import composed, move_of
 from node_support.node_table import NODES as LIVE_NODES
 from node_support.parameters import ParameterSet, with_defaults
 from recordings.reader import ReadingParameters
@@ -178,7 +178,7 @@ class Replayed:
         if any(update.belief is None for update in self.updates):
             return None
         ends = np.array([update.scan.reference_time for update in self.updates])
-        found = [composed(one.belief.theta[POSE], inverse(one.scan.reference_pose)) for one in self.updates]
+        found = [move_of(one.scan.reference_pose, one.belief.theta[POSE]) for one in self.updates]
         return Track(ends, np.array(found))
 
     @property

@@ -16,7 +16,7 @@ from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.headline import WITHIN
 from node_support.errors import counted
-from node_support.geometry import composed, inverse, transformed
+from node_support.geometry import move_of, transformed
 
 _FIRST_YEAR = 1990  # of recordings
 _MOST_LOOPS = 5  # loops that are printed; summary.json has all
@@ -173,4 +173,4 @@ def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:
     if mapped.solution is not None:
         return mapped.solution.heard(scan)[0][:, :2]
     poses = Track(mapped.run.times, mapped.run.best).at(scan.times)
-    return transformed(composed(poses, inverse(scan.track.at(scan.times))), scan.points)[:, :2]
+    return transformed(move_of(scan.track.at(scan.times), poses), scan.points)[:, :2]

@@ -8,7 +8,6 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from nav_msgs.srv import GetMap, GetMapResponse
 from std_msgs.msg import Bool
 
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import MatchInput, MlsmCoreParameters
 from mlsm_manager.localisation.updates import (
@@ -26,7 +25,7 @@ from mlsm_manager.ros.map_publisher import MapPublisher
 from mlsm_manager.ros.map_services import Autosave, MapMarks, MapServices
 from mlsm_manager.ros.odometry_track import OdometryTrack, planar
 from mlsm_manager.ros.status_teller import StatusTeller
-from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.scan_matching.scan import MapCloud, Scan
 from mlsm_manager.self_check.north_east_down import ZDownSigns
 from node_support import topics
 from node_support.errors import RefusedInput

@@ -14,7 +14,7 @@ from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
 from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion, X, Y
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
-from node_support.geometry import composed, inverse, wrapped
+from node_support.geometry import move_of, wrapped
 
 _WINDOW_DEVIATIONS = 3.0  # of the prior, that the search covers
 # Of a score from 0 to 1 per squared standard deviation of the prior: echoes that travel with the vehicle cannot win.
@@ -200,7 +200,7 @@ def relocalised(scan: Scan, target: BlockSource, matcher: Matcher, errors: Odome
     covariance = errors.covariance()
     covariance[X, X] = covariance[Y, Y] = (float((high - low).max()) / 4.0 + 1.0) ** 2
     covariance[YAW, YAW] = np.pi**2
-    correction = composed(middle, inverse(scan.reference_pose))
+    correction = move_of(scan.reference_pose, middle)
     return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))
 
 

@@ -24,7 +24,7 @@ from mlsm_manager.scan_matching.scan_path import (
     X,
     Y,
 )
-from node_support.geometry import composed, inverse, rotated, wrapped
+from node_support.geometry import move_of, rotated, seen_from, wrapped
 from node_support.parameters import ParameterSet, parameter
 
 _NODES = 17  # times at which the odometry is read between two scans, about one a second
@@ -138,7 +138,7 @@ def updated_by_heading(belief: Belief, heading: float, deviation: float) -> Beli
 
 def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
     """Return the belief as a matcher's prior; `odometry_pose` is T_odom_base (3,) at its time."""
-    correction = composed(belief.theta[POSE], inverse(odometry_pose))
+    correction = move_of(odometry_pose, belief.theta[POSE])
     return Prior(correction, belief.theta[RATE], belief.theta[MOTION], belief.covariance)
 
 
@@ -146,7 +146,7 @@ def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarr
     """Return T_map_base (m, 3) at increasing `times` (m,), none before `start`, where the state is `theta` (8,)."""
     nodes = np.append(start, times)
     poses = track.at(nodes)
-    relative = composed(inverse(poses[0]), poses)
+    relative = seen_from(poses[0], poses)
     middle = (nodes[1:] + nodes[:-1]) / 2.0 - start
     heading = (relative[1:, 2] + relative[:-1, 2]) / 2.0
     steps = (1.0 + theta[SCALE]) * rotated(np.diff(relative[:, :2], axis=0), theta[DIRECTION])

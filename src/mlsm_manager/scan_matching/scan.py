@@ -1,14 +1,14 @@
-"""A scan, and what a matcher takes besides it and returns."""
+"""A scan, a cloud, and what a matcher takes besides a scan and returns."""
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Optional, Protocol, Union
+from typing import Optional, Protocol, Sequence, Union
 
 import numpy as np
 
 from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, inverse, transformed, wrapped
+from node_support.geometry import composed, move_of, seen_from, transformed, wrapped
 
 _STANDS = 0.05  # m: a position that moves by less never changed, but for rounding and lever arms of a tilting base
 _TURNS = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more
@@ -58,7 +58,7 @@ class Track:
         if last <= first:
             return np.zeros(3)
         before, after = self.at(np.array([first, last]))
-        return composed(inverse(before), after) / (last - first)
+        return seen_from(before, after) / (last - first)
 
 
 class ReportedMotion:
@@ -164,6 +164,37 @@ class Scan:
         return self.track.at(self.reference_time)
 
 
+@dataclass(frozen=True)
+class MapCloud:
+    """points: (n, 4) float64, x y z [m] in odom and echo strength. times: (n,) s. end: s, stamp of the newest beam."""
+
+    points: np.ndarray
+    times: np.ndarray
+    end: float
+
+    @classmethod
+    def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "MapCloud":
+        """Build from a cloud's points (n, 4) and signed time stamps (n,); points that are not finite are left out."""
+        points = np.asarray(points, dtype=np.float64)
+        stamps = np.asarray(time_stamps, dtype=np.float64)
+        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
+        return cls(points[valid], np.abs(stamps[valid]), end)
+
+    @classmethod
+    def of_scan(cls, scan: Scan) -> "MapCloud":
+        """Return the points of a scan."""
+        return cls(scan.points, scan.times, scan.reference_time)
+
+    @classmethod
+    def joined(cls, clouds: "Sequence[MapCloud]") -> "MapCloud":
+        """Return the points of clouds (at least one), one after the other, as one cloud."""
+        points, times = ([getattr(cloud, name) for cloud in clouds] for name in ("points", "times"))
+        return cls(np.concatenate(points), np.concatenate(times), max(cloud.end for cloud in clouds))
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+
 class MatchStatus(Enum):
     """Whether a match holds, and if not, why."""
 
@@ -231,7 +262,7 @@ class MatchResult:
 
     def correction(self, scan: Scan) -> np.ndarray:
         """Return the (3,) T_map_odom at the scan's reference time that this pose means."""
-        correction = composed(self.pose, inverse(scan.reference_pose))
+        correction = move_of(scan.reference_pose, self.pose)
         correction[2] = wrapped(correction[2])
         return correction
 
@@ -255,4 +286,4 @@ class Matcher(Protocol):
 def corrected_points(scan: Scan, result: MatchResult) -> np.ndarray:
     """Return (n, 4) points in map: each taken from the odometry's pose to the matched pose at its own beam's time."""
     path = np.stack([np.interp(scan.times, result.beam_times, column) for column in result.beam_poses.T], axis=-1)
-    return transformed(composed(path, inverse(scan.track.at(scan.times))), scan.points)
+    return transformed(move_of(scan.track.at(scan.times), path), scan.points)

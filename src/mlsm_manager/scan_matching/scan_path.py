@@ -21,7 +21,7 @@ from typing import Tuple
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry import composed, inverse, rotated
+from node_support.geometry import rotated, seen_from
 
 X, Y, YAW, RATE_X, RATE_Y, RATE_YAW, SCALE, DIRECTION = range(8)
 STATES = 8
@@ -51,7 +51,7 @@ class PlanarMotion:
         poses = odometry[self.beam]
         self.local = rotated(scan.points[:, :2] - poses[:, :2], -poses[:, 2])
         self._tau = self.beam_times - scan.reference_time
-        relative = composed(inverse(odometry[-1]), odometry)
+        relative = seen_from(odometry[-1], odometry)
         self._heading = relative[:, 2]
         self._step = np.diff(relative[:, :2], axis=0)
         self._seconds = np.diff(self.beam_times)

@@ -10,7 +10,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import composed, inverse, rotated, transformed
+from node_support.geometry import composed, inverse, rotated, seen_from, transformed
 
 MOST, FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
 _PAIRS, _FEWEST_PAIRS = 60, 10  # pairs of scans, spread over the run: more tell nothing new, fewer nothing
@@ -85,7 +85,7 @@ class ScanPairs:
         for number in range(len(ends)):
             for apart in _APART:
                 if number + apart < len(ends):
-                    move = composed(inverse(ends[number]), ends[number + apart])
+                    move = seen_from(ends[number], ends[number + apart])
                     if np.hypot(*move[:2]) + 10.0 * abs(move[2]) > _MOVED:
                         found.append((number, number + apart))
         return found[:: -(-len(found) // _PAIRS)] if found else []

@@ -16,7 +16,7 @@ from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ran
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.motion_findings import MotionFindings, motion_findings
 from mlsm_manager.self_check.standing import standing_causes
-from node_support.geometry import composed, inverse
+from node_support.geometry import composed, move_of
 
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
@@ -45,7 +45,7 @@ class LiveCauses:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
         with self._lock:
             self._scans.append(scan)
-            self._corrections.append(composed(pose, inverse(scan.reference_pose)))
+            self._corrections.append(move_of(scan.reference_pose, pose))
             self._places.append((scan.reference_time, float(pose[0]), float(pose[1])))
             self._is_new = True
 

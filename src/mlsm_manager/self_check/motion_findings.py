@@ -27,7 +27,7 @@ from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, cours
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
 from mlsm_manager.self_check.map_checks import scans_go_on
-from node_support.geometry import composed, inverse, rotated, transformed
+from node_support.geometry import move_of, rotated, transformed
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
@@ -144,7 +144,7 @@ class MotionFindings:
                 scan, sonar_in_base = fault.placed(scan, sonar_in_base), fault.sonar_in_base(sonar_in_base)
         if self.track is reported:
             return scan
-        moves = composed(self.track.at(scan.times), inverse(reported.at(scan.times)))
+        moves = move_of(reported.at(scan.times), self.track.at(scan.times))
         return replace(scan, points=transformed(moves, scan.points), track=self.track)
 
 

@@ -7,7 +7,7 @@ from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.verdict import Verdict, percent
-from node_support.geometry import composed, inverse
+from node_support.geometry import composed, seen_from
 
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
 _CLIMB = 2.0
@@ -94,7 +94,7 @@ def _placed(scan: Scan, signs: np.ndarray) -> np.ndarray:
     """Return (n, 2) echoes in odom, m, where the vehicle's poses are multiplied by `signs`."""
     chosen = slice(None, None, -(-len(scan) // _MOST))
     points, poses = scan.points[chosen, :2], scan.track.at(scan.times[chosen])
-    seen = composed(inverse(poses), np.column_stack([points, np.zeros(len(points))]))
+    seen = seen_from(poses, np.column_stack([points, np.zeros(len(points))]))
     return composed(poses * signs, seen)[:, :2]
 
 

@@ -7,7 +7,7 @@ from weakref import WeakSet
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks
+from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks, keys_of
 from node_support.numba_cache import compiled
 
 _PIECE = 1 << 15  # rows copied at once: 3 MB, one or two milliseconds
@@ -130,8 +130,9 @@ def _placed(keys, held_keys):
 class BlockStore:
     """Rows, the chain of each cell and the rows that are free. All access is by whole arrays."""
 
-    def __init__(self, expected_blocks: int) -> None:
-        """`expected_blocks`: room is reserved for so many."""
+    def __init__(self, resolution: float, expected_blocks: int = 0) -> None:
+        """`resolution`: side of a cell, m. `expected_blocks`: room is reserved for so many."""
+        self.resolution = resolution
         reserved = max(expected_blocks, _MIN_ROWS)
         self._rows = np.empty((reserved, ROW_WIDTH))
         self._following = np.empty(reserved, dtype=np.int32)
@@ -155,28 +156,27 @@ class BlockStore:
         """(n,) numbers of all rows that hold a block, increasing."""
         return np.flatnonzero(self._rows[: self._used, COUNT])
 
-    def blocks(self, rows: np.ndarray, resolution: float) -> Blocks:
+    def blocks(self, rows: np.ndarray) -> Blocks:
         """Return a copy of the blocks in `rows` (n,)."""
-        return Blocks(self._rows[rows], resolution, self._crossed[rows])
+        return Blocks(self._rows[rows], self.resolution, self._crossed[rows])
 
-    def begin_copy(self, resolution: float) -> "RunningCopy":
+    def begin_copy(self) -> "RunningCopy":
         """Return a copy of all blocks as they are now, which is still to be made."""
-        copy = RunningCopy(self._rows, self._crossed, self._used, resolution)
+        copy = RunningCopy(self._rows, self._crossed, self._used, self.resolution)
         self._copies.add(copy)
         return copy
 
     @property
-    def arrays(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-        """All arrays, good until the store grows, for compiled loops to read and write.
-
-        The blocks (n, ROW_WIDTH), the row (n,) that follows each in its cell, what crossed them (n,), and the first
-        rows (s,) of all cells.
-        """
+    def _arrays(self) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
         return (self._rows, self._following, self._crossed, self._index.heads)
 
-    def slots(self, cells: np.ndarray) -> np.ndarray:
-        """Return (n,) the places of cells with keys `cells` (n,), none twice, in the index; new cells get one."""
-        return self._index.slots(cells)
+    def places(self, cells: np.ndarray) -> Tuple[np.ndarray, Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]]:
+        """Return (n,) the places of cells with keys `cells` (n,), none twice, and all arrays for compiled loops.
+
+        New cells get a place. The arrays are good until the store grows: the blocks (n, ROW_WIDTH), the row (n,) that
+        follows each in its cell, what crossed them (n,), and the first rows (s,) of all cells, where the places are.
+        """
+        return self._index.slots(cells), self._arrays
 
     def find(self, cells: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return row numbers (m,) of all blocks of cells with keys `cells` (n,), and whose they are, (m,) indices."""
@@ -198,13 +198,15 @@ class BlockStore:
         new = runs.row < 0
         runs.row[new] = self._take(int(np.count_nonzero(new)))
         self._announce(runs.row[runs.changed])
-        _write(runs[:-1], runs.changed, self.arrays, slots)
+        _write(runs[:-1], runs.changed, self._arrays, slots)
 
-    def remove(self, rows: np.ndarray, cells: np.ndarray) -> None:
-        """Forget the blocks in `rows` (n,), all of them in cells with keys `cells` (c,), none twice."""
+    def remove(self, rows: np.ndarray) -> np.ndarray:
+        """Forget the blocks in `rows` (n,), none twice; return the keys (c,) of their cells, sorted."""
+        cells = np.unique(keys_of(self._rows[rows], self.resolution))
         self._release(rows)
-        slots = self._index.slots(cells)
-        _unlink_released(self.arrays, slots)
+        slots, held = self.places(cells)
+        _unlink_released(held, slots)
+        return cells
 
     def _announce(self, rows: np.ndarray) -> None:
         """Tell the running copies that `rows` (n,) will be written to."""

@@ -142,6 +142,11 @@ def cell_keys(cells: np.ndarray) -> np.ndarray:
     return (cells[:, 0] << 32) + cells[:, 1]
 
 
+def keys_of(points: np.ndarray, resolution: float) -> np.ndarray:
+    """Return (n,) int64, the keys of the cells of points (n, >= 2)."""
+    return cell_keys(cells_of(points, resolution))
+
+
 def cells_of_keys(keys: np.ndarray) -> np.ndarray:
     """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
     low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000

@@ -16,7 +16,7 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys, cells_of
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys, keys_of
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.parameters import ParameterSet, parameter
 
@@ -206,7 +206,7 @@ class Carver:
         either that block or that echo is wrong. That block counts a crossing, unless the scan itself hit its cell.
         """
         paths = beam_paths(beams, self.beam_width, occupied.resolution)
-        hit = np.isin(cell_keys(paths.cells), cell_keys(cells_of(points, occupied.resolution)))
+        hit = np.isin(cell_keys(paths.cells), keys_of(points, occupied.resolution))
         blocks, rows, owners = occupied.find(paths.cells)
         pair, block = self._meetings(paths, blocks, owners)
         first = np.full(len(beams.origins), np.inf)

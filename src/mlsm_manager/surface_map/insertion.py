@@ -33,10 +33,10 @@ def blocks_of(points: np.ndarray, resolution: float, limit: float = np.inf) -> B
     return Blocks(groups.rows, resolution, groups.crossed)
 
 
-def insert_points(store: BlockStore, points: np.ndarray, resolution: float) -> np.ndarray:
+def insert_points(store: BlockStore, points: np.ndarray) -> np.ndarray:
     """Insert admitted points (n, 4); return the keys (c,) of the cells that they went into, sorted."""
-    cells, groups = grouped_points(points, resolution)
-    _insert_groups(store, cells, groups, resolution)
+    cells, groups = grouped_points(points, store.resolution)
+    _insert_groups(store, cells, groups)
     return cells
 
 
@@ -46,28 +46,28 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
     rows = blocks.rows.astype(np.float64, copy=False)
     cells, order, starts = sorted_by_cell(cell_keys(blocks.cells), rows[:, BOTTOM])
     owner = np.repeat(np.arange(len(cells)), np.diff(starts))
-    _insert_groups(store, cells, Groups(rows[order], owner, blocks.crossed[order]), blocks.resolution)
+    _insert_groups(store, cells, Groups(rows[order], owner, blocks.crossed[order]))
     return cells
 
 
-def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups, resolution: float) -> None:
-    slots = store.slots(cells)
-    runs, fused = _merged_runs(tuple(groups), store.arrays, slots, resolution)
+def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups) -> None:
+    slots, held = store.places(cells)
+    runs, fused = _merged_runs(tuple(groups), held, slots, store.resolution)
     store.write(slots, runs, fused)
 
 
 @lru_cache(maxsize=None)
 def compile_loops() -> None:
     """Compile all loops, or read them from numba's cache, once in a process: not when the first scan comes."""
-    store = BlockStore(0)
+    store = BlockStore(1.0)
     for writeable in (True, False):
         points = np.zeros((2, 4))
         points.flags.writeable = writeable
         kept, _ = admitted(points, 1.0)
-    insert_points(store, kept, 1.0)
-    insert_blocks(store, store.blocks(store.rows_in_use, 1.0))
+    insert_points(store, kept)
+    insert_blocks(store, store.blocks(store.rows_in_use))
     store.find(np.zeros(1, dtype=np.int64))
-    store.remove(store.rows_in_use, np.zeros(1, dtype=np.int64))
+    store.remove(store.rows_in_use)
 
 
 @compiled()

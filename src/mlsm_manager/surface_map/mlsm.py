@@ -54,7 +54,7 @@ class MultiLevelSurfaceMap:
         compile_loops()
         self.resolution = resolution
         self.limit = limit
-        self._store = BlockStore(expected_blocks)
+        self._store = BlockStore(resolution, expected_blocks)
         self._changed = ChangedTiles()
 
     def __len__(self) -> int:
@@ -69,11 +69,11 @@ class MultiLevelSurfaceMap:
     @property
     def blocks(self) -> Blocks:
         """A copy of all blocks, in no particular order."""
-        return self._store.blocks(self._store.rows_in_use, self.resolution)
+        return self._store.blocks(self._store.rows_in_use)
 
     def begin_copy(self) -> RunningCopy:
         """Return a copy of all blocks as they are now, which is still to be made; see `finished`."""
-        return self._store.begin_copy(self.resolution)
+        return self._store.begin_copy()
 
     def in_box(self, low: np.ndarray, high: np.ndarray) -> Blocks:
         """Return a copy of the blocks whose mean lies between `low` and `high`, (2,) x y or (3,) x y z [m].
@@ -83,7 +83,7 @@ class MultiLevelSurfaceMap:
         """
         low, high = np.asarray(low, dtype=np.float64), np.asarray(high, dtype=np.float64)
         if not (low <= high).all():
-            return self._store.blocks(np.empty(0, dtype=np.int64), self.resolution)
+            return self._store.blocks(np.empty(0, dtype=np.int64))
         first, last = cells_of(np.clip([low, high], -self.limit, self.limit), self.resolution)
         return self._in_cells(first, last).in_box(low, high)
 
@@ -92,7 +92,7 @@ class MultiLevelSurfaceMap:
         within = grid(np.arange(1 << TILE_BITS))
         cells = (np.asarray(tiles, dtype=np.int64).reshape(-1, 1, 2) << TILE_BITS) + within
         rows, _ = self._store.find(cell_keys(cells.reshape(-1, 2)))
-        return self._store.blocks(rows, self.resolution)
+        return self._store.blocks(rows)
 
     def take_changed_tiles(self) -> np.ndarray:
         """Return the (n, 2) int64 tiles whose blocks changed since the last call, sorted.
@@ -107,7 +107,7 @@ class MultiLevelSurfaceMap:
         The rows are good for `count_crossings` and `remove`, until points are inserted or blocks removed.
         """
         rows, owners = self._store.find(cell_keys(cells))
-        return self._store.blocks(rows, self.resolution), rows, owners
+        return self._store.blocks(rows), rows, owners
 
     def is_near(self, points: np.ndarray) -> np.ndarray:
         """Return which points (n, >= 2) lie in a cell that holds a block or adjoins one that does."""
@@ -120,7 +120,7 @@ class MultiLevelSurfaceMap:
 
     def at(self, rows: np.ndarray) -> Blocks:
         """Return a copy of the blocks in `rows` (n,), which `find` named."""
-        return self._store.blocks(rows, self.resolution)
+        return self._store.blocks(rows)
 
     def replace(self, parts: Sequence[Blocks]) -> None:
         """Forget all blocks, and insert those of all `parts`."""
@@ -136,9 +136,7 @@ class MultiLevelSurfaceMap:
         """Forget the blocks in `rows` (n,), none twice."""
         if not len(rows):
             return
-        cells = np.unique(cell_keys(self._store.blocks(rows, self.resolution).cells))
-        self._store.remove(rows, cells)
-        self._changed.note(cells)
+        self._changed.note(self._store.remove(rows))
 
     def insert(self, points: np.ndarray) -> InsertReport:
         """Insert points (n, 4), x y z [m] and strength, in the map's frame, as one batch.
@@ -146,7 +144,7 @@ class MultiLevelSurfaceMap:
         Points that are not finite or beyond the limit are left out and counted.
         """
         kept, report = admitted(points, self.limit)
-        self._changed.note(insert_points(self._store, kept, self.resolution))
+        self._changed.note(insert_points(self._store, kept))
         return report
 
     def insert_blocks(self, blocks: Blocks) -> InsertReport:
@@ -171,7 +169,7 @@ class MultiLevelSurfaceMap:
         x, y = np.arange(first[0], last[0] + 1), np.arange(first[1], last[1] + 1)
         keys = ((x << 32)[:, np.newaxis] + y).ravel()
         rows, _ = self._store.find(keys)
-        return self._store.blocks(np.sort(rows), self.resolution)
+        return self._store.blocks(np.sort(rows))
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from made_recordings import HARBOUR, ranges_along
 
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.scan_matching.scan import Scan, Track
-from node_support.geometry import composed, inverse, rotated, transformed
+from node_support.geometry import inverse, move_of, rotated, transformed
 
 TURN = 14.0  # s per turn of the head
 BEAMS = 120
@@ -73,7 +73,7 @@ def reporting(scan: Scan, factor: float) -> Scan:
     """Return a scan whose odometry reports distances that are `factor` times the true ones."""
     track = scan.track
     scaled = Track(track.times, track.poses * [factor, factor, 1.0])
-    moves = composed(scaled.at(scan.times), inverse(track.at(scan.times)))
+    moves = move_of(track.at(scan.times), scaled.at(scan.times))
     return replace(scan, points=transformed(moves, scan.points), track=scaled)
 
 

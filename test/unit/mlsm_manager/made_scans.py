@@ -4,7 +4,7 @@ import numpy as np
 from made_maps import map_with
 
 from mlsm_manager.scan_matching.scan import Prior, Scan, Track
-from node_support.geometry import composed, inverse, transformed
+from node_support.geometry import composed, move_of, transformed
 
 SECONDS = 16.0
 DEVIATIONS = np.array([1.0, 1.0, 0.1, 1e-2, 1e-2, 1e-3, 1e-3, 1e-3])
@@ -54,7 +54,7 @@ def scan_of(places, true_path, odometry=None, start=0.0, moving=False):
     bearing = np.arctan2(*(places - true_path(start)[:2]).T[::-1])
     places = places[np.argsort(bearing)]
     times = start + np.linspace(0.0, SECONDS, len(places))
-    to_odometry = composed(odometry(times), inverse(true_path(times)))
+    to_odometry = move_of(true_path(times), odometry(times))
     points = np.column_stack([places, np.full(len(places), -2.0), np.full(len(places), 50.0)])
     track_times = np.linspace(start - SECONDS, start + SECONDS, 129)
     track = Track(track_times, odometry(track_times))
@@ -83,5 +83,5 @@ def map_of(places, resolution=0.5):
 
 def prior_of_pose(scan, pose, deviations=DEVIATIONS):
     """Return the prior that believes in `pose` (3,) at the reference time and in the odometry's motion."""
-    correction = composed(np.array(pose, dtype=float), inverse(scan.reference_pose))
+    correction = move_of(scan.reference_pose, np.array(pose, dtype=float))
     return Prior(correction, np.zeros(3), np.zeros(2), np.diag(np.array(deviations) ** 2))

@@ -97,11 +97,11 @@ def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
 def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
     state, rows = some_state(log), log.surfaces.rows(0, 3)
     pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
-    before = solution_of(log, MODELS[0], state).placed(rows)
+    before = solution_of(log, MODELS[0], state).placed(log.surfaces.points(rows))
     _, jacobian = linearised(pairs, before, before)
     moved = state.copy()
     moved.nodes[0, column] += STEP
-    after = solution_of(log, MODELS[0], moved).placed(rows)
+    after = solution_of(log, MODELS[0], moved).placed(log.surfaces.points(rows))
     moves = after.places[pairs.rows] - before.places[pairs.rows]
     change = np.einsum("na,na->n", moves, before.normals[pairs.neighbours])
     np.testing.assert_allclose(change / STEP, jacobian[:, column], atol=1e-4)
@@ -114,7 +114,8 @@ def test_comparisons_do_not_tell_how_the_whole_map_is_turned(log, normal_deviati
         solution_of(log, MODELS[0], some_state(log)),
         solver_parameters(),
     )
-    points, places = solution.placed(log.surfaces.rows(0, 3)), solution.node_places(np.arange(log.scan_count + 1))
+    points = solution.placed(log.surfaces.points(log.surfaces.rows(0, 3)))
+    places = solution.node_places(np.arange(log.scan_count + 1))
     rows = np.arange(len(points))
     pairs = Pairs(rows, rng.permutation(rows), np.ones(len(rows)))
     scans, others, information, gradient = summed(pairs, points, points, parameters, parameters.cut)
@@ -149,7 +150,7 @@ def placed_by_numpy(log, odometry, state, rows):
 @pytest.mark.parametrize("delay", [0.0, -1.7, 900.0])
 def test_points_lie_on_the_path_whatever_the_odometry_tells(log, odometry, delay):
     state, rows = some_state(log, odometry, delay), log.surfaces.rows(1, 3)
-    found = solution_of(log, odometry, state).placed(rows)
+    found = solution_of(log, odometry, state).placed(log.surfaces.points(rows))
     for name, expected in zip(("places", "arms", "normals", "shares"), placed_by_numpy(log, odometry, state, rows)):
         close = SAME * np.abs(expected).max()
         np.testing.assert_allclose(getattr(found, name), expected, rtol=SAME, atol=close, err_msg=name)
@@ -168,7 +169,7 @@ def test_the_path_goes_on_beyond_the_nodes_as_the_odometry_does(log, odometry):
 
 
 def test_no_points_lie_nowhere(log):
-    nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.surfaces.rows(0, 0))
+    nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.surfaces.points(log.surfaces.rows(0, 0)))
     assert [len(getattr(nothing, field.name)) for field in fields(nothing)] == [0] * len(fields(nothing))
 
 

@@ -19,12 +19,12 @@ from made_models import HEADING, solver_parameters
 from mlsm_manager.joint_solver.estimate import Turns
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.solution import MAP
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
+from mlsm_manager.scan_matching.scan import MapCloud
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the search over places is tested with every version")]
+pytestmark = pytest.mark.long
 BEGIN, SILENT, END = 14, 8, 24  # scans before the silence, in it, and in all
 
 

@@ -13,7 +13,7 @@ from made_posts import heard
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
 from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
-from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, SparseSolution, State
+from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, Residuals, SparseSolution, State
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of, stacked, unstacked
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
@@ -31,7 +31,7 @@ def some_state(log):
 
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
-    placed = solution_of(log, DVL, some_state(log)).placed(log.surfaces.rows(0, 3))
+    placed = solution_of(log, DVL, some_state(log)).placed(log.surfaces.points(log.surfaces.rows(0, 3)))
     pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, solver_parameters())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
@@ -40,11 +40,11 @@ def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
 @pytest.mark.parametrize("unknown", range(2))
 def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown):
     rows, state = log.surfaces.rows(0, 3), some_state(log)
-    placed = solution_of(log, DVL, state).placed(rows)
+    placed = solution_of(log, DVL, state).placed(log.surfaces.points(rows))
     moved = state.copy()
     step = 0.01  # delays within one step of the odometry: its path is a polygon
     moved.run[unknown] += step
-    change = (solution_of(log, DVL, moved).placed(rows).places - placed.places) / step
+    change = (solution_of(log, DVL, moved).placed(log.surfaces.points(rows)).places - placed.places) / step
     np.testing.assert_allclose(change, placed.by_run[..., unknown], atol=0.5)
     np.testing.assert_allclose(np.median(np.abs(change - placed.by_run[..., unknown])), 0.0, atol=0.03)
 
@@ -86,13 +86,13 @@ def test_dense_and_sparse_solutions_agree():
     rng = np.random.RandomState(5)
     equations = NormalEquations(8)
     columns = rng.randint(0, 8, (40, 3))
-    equations.add(columns, rng.normal(size=(40, 3)), rng.normal(size=40), rng.uniform(0.5, 2.0, 40))
+    equations.add(Residuals(columns, rng.normal(size=(40, 3)), rng.normal(size=40), rng.uniform(0.5, 2.0, 40)))
     np.testing.assert_allclose(DenseSolution(equations).step, SparseSolution(equations).step, rtol=1e-6)
 
 
 def test_an_error_of_what_is_held_passes_on_to_what_hangs_on_it():
     equations = NormalEquations(1, held=1)
-    equations.add(np.array([[0, 1]]), np.array([[1.0, -1.0]]), np.zeros(1), np.array([4.0]))
+    equations.add(Residuals(np.array([[0, 1]]), np.array([[1.0, -1.0]]), np.zeros(1), np.array([4.0])))
     solution = DenseSolution(equations)
     assert solution.covariances(np.array([[0]]), np.array([[9.0]]))[0][0, 0, 0] == pytest.approx(0.25 + 9.0)
 

@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import random_points
 
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.scan_matching.scan import MapCloud
 from mlsm_manager.surface_map.free_space import Carver, CarvingParameters, FirstEchoes
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 

@@ -6,7 +6,6 @@ from benchmarks.matchers import BEAM_WIDTH
 from made_open_water import bubbles, outcome
 from made_scans import SECONDS, drifting, elsewhere, harbour, map_of, scan_of, still, wall
 
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.localiser import Localiser, MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, LocaliserParameters, MlsmCoreParameters
@@ -14,7 +13,7 @@ from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.scan_matching.distribution_matcher import EVERYWHERE, NEARBY, DistributionMatcher, relocalised
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.scan import MatchStatus
+from mlsm_manager.scan_matching.scan import MapCloud, MatchStatus
 from node_support.errors import RefusedInput
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
@@ -273,7 +272,6 @@ OPEN_WATER_SCANS = 50
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("a statistic of many scans; the tests above compute single ones")
 @pytest.mark.parametrize("estimator", EstimatorName)
 def test_noise_and_bubbles_correct_nothing(estimator):
     found = outcome(bubbles, estimator, OPEN_WATER_SCANS, seed=2)

@@ -13,9 +13,9 @@ from mlsm_manager.joint_solver.live_window import nearest_groups, superfluous
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation import joint_session
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
+from mlsm_manager.scan_matching.scan import MapCloud
 from node_support.numba_cache import LONGEST_DESCRIPTION
 
 SCANS = tour(12).scans

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from made_scans import harbour, scan_of, still, wall
 
-from mlsm_manager.localisation.clouds import MapCloud
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
+from mlsm_manager.scan_matching.scan import MapCloud
 from mlsm_manager.surface_map.free_space import Carver, CarvingParameters, FirstEchoes, beam_paths
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap

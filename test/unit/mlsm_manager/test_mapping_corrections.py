@@ -8,10 +8,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_scans import at_velocity, still
 
-from mlsm_manager.localisation.clouds import CorrectionHistory, MapCloud
+from mlsm_manager.localisation.clouds import CorrectionHistory
 from mlsm_manager.localisation.following import LiveCorrection
 from mlsm_manager.scan_matching.prediction import Belief, Fading
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan import MapCloud, Track
 
 TIMES = np.arange(0.0, 10.0, 0.1)
 

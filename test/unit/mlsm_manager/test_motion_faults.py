@@ -17,7 +17,7 @@ from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
 from mlsm_manager.self_check.echo_causes import echo_findings
-from node_support.geometry import composed, inverse
+from node_support.geometry import move_of
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 TWICE_ROUND = touring()
@@ -103,7 +103,6 @@ def test_a_heading_that_stuck_turns_evenly_meanwhile():
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed():
     noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
     alone = broken.with_compass_error(WHOLE.without_positions(), noise)
@@ -115,7 +114,7 @@ def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed()
 @pytest.mark.parametrize("degrees", [0.0, 25.0])
 def test_a_slip_of_the_head_is_suspected_beside_a_compass_alone_where_scans_lie_turned_as_the_vehicle_went(degrees):
     alone = broken.head_slips(WHOLE.without_positions(), MIDDLE, degrees)
-    went = composed(WHOLE.track.poses, inverse(alone.track.poses))
+    went = move_of(alone.track.poses, WHOLE.track.poses)
     scans = [scan for scan, _ in scans_of(alone, EchoExtractor(EchoExtractorParameters()))]
     found = echo_findings(scans, alone.sonar_in_base, Track(WHOLE.track.times, went))
     assert found.causes == []
@@ -124,7 +123,6 @@ def test_a_slip_of_the_head_is_suspected_beside_a_compass_alone_where_scans_lie_
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_a_slip_of_the_head_beside_a_compass_alone_is_named_and_the_path_fitted_without_it():
     found = mapped_as(broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0), "--refine")
     assert_named_first(found.findings, "the head slipped by 2")
@@ -132,7 +130,6 @@ def test_a_slip_of_the_head_beside_a_compass_alone_is_named_and_the_path_fitted_
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_a_slip_of_the_head_beside_a_compass_alone_is_named_within_three_turns_while_the_run_goes_on():
     parameters = ReplayParameters().changed(profile_values(OdometryKind.HEADING))
     recording = broken.head_slips(TWICE_ROUND.without_positions(), 150.0, 25.0)
@@ -146,7 +143,6 @@ def test_a_slip_of_the_head_beside_a_compass_alone_is_named_within_three_turns_w
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 @pytest.mark.parametrize(
     ("recording", "said"),
     [
@@ -160,7 +156,6 @@ def test_what_echoes_correct_is_named_first(recording, said):
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is mapped three times")
 def test_positions_that_go_elsewhere_are_left_out():
     found = mapped_as(rare.odometry_drifts(TWICE_ROUND.without_positions(), 0.0, 0.1))
     assert found.odometry.kind is OdometryKind.HEADING
@@ -168,7 +163,6 @@ def test_positions_that_go_elsewhere_are_left_out():
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 def test_nothing_is_named_where_nothing_is_wrong():
     assert mapped_as(WHOLE, "--refine").findings.trust.causes == []
 

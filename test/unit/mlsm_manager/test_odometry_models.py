@@ -10,7 +10,7 @@ from made_models import COMPASS, errors_of, followed
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.estimate import scale_covariance
-from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, solution_of
+from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, Residuals, solution_of
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.velocity_models import by_heading
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -18,7 +18,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import harmonics
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the solver and its parts are tested with every version")]
+pytestmark = pytest.mark.long
 
 STEP = 1e-6
 TIMES = np.array([0.0, 14.0, 28.0])
@@ -53,7 +53,7 @@ def step_of_motion(node):
 def equations_of(model, nodes):
     layout = Layout(0, 2, model.width)
     equations = NormalEquations(layout.size)
-    model.add_steps(equations, layout.step_starts, nodes, MOTION)
+    equations.add(*model.steps(layout.step_starts, nodes, MOTION))
     return equations
 
 
@@ -107,7 +107,7 @@ def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
     elsewhere[:, :2] += POSES[:, :2] - positions
     other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead, MOTION.held)
     there = NormalEquations(Layout(0, 2, model.width).size)
-    model.add_steps(there, Layout(0, 2, model.width).step_starts, elsewhere, other)
+    there.add(*model.steps(Layout(0, 2, model.width).step_starts, elsewhere, other))
     np.testing.assert_allclose(there.gradient, equations_of(model, nodes).gradient, rtol=1e-9, atol=1e-9)
 
 
@@ -151,7 +151,7 @@ def test_while_positions_are_held_nobody_knows_how_far_the_vehicle_goes(kind):
     nodes = model.first_node() + np.array([[0.0], [4.0], [4.0]]) * np.eye(model.width)[0]
     held = Motion(TIMES, POSES, MOTION.ahead, np.array([0.0, 14.0, 14.0]))
     reported, told = NormalEquations(Layout(0, 2, model.width).size), equations_of(model, nodes)
-    model.add_steps(reported, Layout(0, 2, model.width).step_starts, nodes, held)
+    reported.add(*model.steps(Layout(0, 2, model.width).step_starts, nodes, held))
     assert told.cost > 5.0 * reported.cost
 
 
@@ -240,10 +240,10 @@ def test_a_compass_that_errs_by_the_heading_is_an_unknown_that_is_eliminated():
         kept = change.kept[:, np.newaxis]
         steps = np.column_stack([np.ones(9), -change.kept, (errors[1:] - kept * errors[:-1])[:, :count]])
         places = np.column_stack([columns[1:], columns[:-1], own[1:]])
-        equations.add(places, steps, np.zeros(9), 1.0 / change.variance)
+        equations.add(Residuals(places, steps, np.zeros(9), 1.0 / change.variance))
         first = np.append(1.0, errors[0, :count])[np.newaxis]
         start = np.append(columns[0], own[0])[np.newaxis]
-        equations.add(start, first, np.zeros(1), np.array([COMPASS.heading_deviation**-2.0]))
+        equations.add(Residuals(start, first, np.zeros(1), np.array([COMPASS.heading_deviation**-2.0])))
         unknowns = np.arange(layout.size + count)
         told = np.where(unknowns < layout.size, 0.03, 1.0)  # by the echoes, and of errors of one beforehand
         equations.add_prior(unknowns, np.zeros(len(unknowns)), np.zeros(len(unknowns)), told)

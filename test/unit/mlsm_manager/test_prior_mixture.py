@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.joint_solver.normal_equations import NormalEquations
+from mlsm_manager.joint_solver.normal_equations import NormalEquations, Residuals
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian, PriorComponent, PriorMixture, PriorTerm
 
 NARROW, WIDE, SHARE = 0.01, 0.3, 0.8
@@ -78,22 +78,21 @@ def test_a_term_that_was_added_can_be_taken_out_again(information, vector):
 
 @pytest.mark.parametrize("truth", [0.0, 0.3])
 def test_step_by_step_the_prior_becomes_that_of_the_component_that_holds(truth):
-    prior, node = AdaptedPrior(MIXTURE, None), np.zeros(2)
+    prior, node, covariance = AdaptedPrior(MIXTURE, None), np.zeros(2), np.eye(2)
     for _ in range(5):
         equations = NormalEquations(2)
         equations.add_prior(np.arange(2), node, np.array([0.0, 0.0]), np.array([1.0, WIDE]))
-        equations.add(np.array([[1]]), np.ones((1, 1)), node[1:] - truth, np.array([0.04**-2]))
-        prior.add(equations, 0, node)
+        equations.add(Residuals(np.array([[1]]), np.ones((1, 1)), node[1:] - truth, np.array([0.04**-2])))
+        prior.add(equations, 0, node, lambda columns, found=covariance: found[np.ix_(columns, columns)])
         information, _ = equations.dense()
         covariance = np.linalg.inv(information)
         node = node - covariance @ equations.gradient
-        prior.learn(0, node, lambda columns, found=covariance: found[np.ix_(columns, columns)])
     assert node[1] == pytest.approx(truth, abs=0.01)
     assert np.sqrt(covariance[1, 1]) == pytest.approx(0.04 if truth else 0.015, abs=0.006)
 
 
 def test_a_model_without_a_mixture_adds_nothing():
     prior, equations = AdaptedPrior(None, None), NormalEquations(2)
-    prior.add(equations, 0, np.zeros(2))
+    prior.add(equations, 0, np.zeros(2), np.zeros)
     assert not equations.gradient.any()
     assert prior.term.vector.size == 0

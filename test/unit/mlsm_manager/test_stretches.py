@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 from test_keyframes import CARVER, LIMIT, RESOLUTION, made_at_once, patch
 
-from mlsm_manager.localisation import stretches
-from mlsm_manager.localisation.clouds import MapCloud
+from mlsm_manager.localisation import keyframe_traces
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
-from mlsm_manager.localisation.stretches import Stretches
+from mlsm_manager.localisation.keyframe_traces import Stretches
+from mlsm_manager.scan_matching.scan import MapCloud
 from mlsm_manager.surface_map.point_groups import sorted_by_cell
 
 EVERYTHING = 1e9
@@ -77,14 +77,14 @@ def test_points_of_no_keyframe_are_not_lost():
 
 
 def test_many_stretches_become_fewer_and_stay_in_the_map(monkeypatch):
-    monkeypatch.setattr(stretches, "_MOST", 3)
+    monkeypatch.setattr(keyframe_traces, "_MOST", 3)
     made, bent = settled(*(patch(number) for number in range(6))), Bent(4.0)
     made.redraw(bent)
     assert_same(made.map.blocks, made_at_once(*(bent.points(patch(number)) for number in range(6))))
 
 
 def test_a_place_that_is_passed_for_hours_takes_no_more_memory_and_the_newest_path_still_bends(monkeypatch):
-    monkeypatch.setattr(stretches, "_FEWEST_BLOCKS", 0)
+    monkeypatch.setattr(keyframe_traces, "_FEWEST_BLOCKS", 0)
     points, own = patch(1).points, Stretches(RESOLUTION)
     made = KeyframeMap(RESOLUTION, LIMIT, stretches=own)
     for number in range(60):
