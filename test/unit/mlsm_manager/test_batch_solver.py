@@ -16,7 +16,6 @@ from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.offline.refinement import displaced, other_settings, refitted_verdicts
 
 pytestmark = pytest.mark.long
-slow = pytest.mark.newest_only("slow; the first loop is looked for and found with every version")
 
 RETURNED = slice(26, None)  # nodes of the scans after the deaf ones
 RESUMED = 20  # scans
@@ -38,7 +37,7 @@ def errors(solver, batch, track, made):
     return np.hypot(*(found - made.truth.at(times))[:, :2].T)
 
 
-@pytest.mark.parametrize("drift", [(12.0, -6.0), pytest.param((9.0, 9.0), marks=slow)])
+@pytest.mark.parametrize("drift", [(12.0, -6.0), (9.0, 9.0)])
 def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift):
     made = tour(40)
     scans, track = astray(made, np.array(drift))
@@ -51,7 +50,6 @@ def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings(drift
     assert "of its echoes fit there" in found.to_mapping()["found"][0]
 
 
-@slow
 def test_a_run_that_is_not_astray_has_no_loops():
     solver = followed(tour(40).scans)
     batch = fit_of(solver.solution)
@@ -60,7 +58,6 @@ def test_a_run_that_is_not_astray_has_no_loops():
     assert found.to_mapping() == {"gain": None, "found": []}
 
 
-@slow
 def test_noise_makes_no_loops():
     rng = np.random.RandomState(0)
 
@@ -72,7 +69,6 @@ def test_noise_makes_no_loops():
     assert loops_of(solver.solution) == []
 
 
-@slow
 def test_a_canal_makes_no_loops():
     """Along straight walls every place fits as well as the next."""
     rng, made = np.random.RandomState(1), tour(40)
@@ -124,14 +120,12 @@ def of_walls():
     return verdicts_of(WALLS)
 
 
-@slow
 @pytest.mark.parametrize("name", ["spread over settings", "second start"])
 def test_walls_lead_every_fit_to_the_same_path(of_walls, name):
     assert not of_walls[name].fires
     assert of_walls[name].value < 0.2
 
 
-@slow
 @pytest.mark.parametrize("seed", range(2))
 def test_furrows_that_all_look_alike_lead_from_another_start_to_another_path(seed):
     rng, made = np.random.RandomState(seed), tour(24, direction=0.05)
@@ -139,14 +133,12 @@ def test_furrows_that_all_look_alike_lead_from_another_start_to_another_path(see
     assert found["second start"].fires
 
 
-@slow
 def test_the_second_start_lies_a_told_deviation_beside_the_path_and_within_the_cut():
     state = followed(WALLS[:3]).state
     moved = displaced(state, np.array([0.0, 0.5, 1.0, 9.0]), 2.2)
     np.testing.assert_allclose(np.hypot(*(moved.nodes - state.nodes)[:, :2].T), [0.0, 0.5, 1.0, 2.2])
 
 
-@slow
 def test_other_settings_differ_from_the_run_s_in_one_thing_each():
     own = solver_parameters()
     for other in other_settings(own):
@@ -161,7 +153,6 @@ def part():
     return solved_part(followed(WALLS), FIRST)
 
 
-@slow
 def test_it_finds_what_a_run_of_its_scans_alone_finds(part):
     alone = fit_of(followed(WALLS[FIRST:]).solution)
     np.testing.assert_allclose(part.run, alone.state.run, atol=0.01)
@@ -169,7 +160,6 @@ def test_it_finds_what_a_run_of_its_scans_alone_finds(part):
     np.testing.assert_allclose(part.covariance[-RUN_COLUMNS:, -RUN_COLUMNS:], alone.run_covariance, rtol=0.1)
 
 
-@slow
 def test_it_knows_the_delay_less_well_than_the_whole_run(part):
     whole = fit_of(followed(WALLS).solution)
     assert part.covariance[-RUN_COLUMNS:, -RUN_COLUMNS:][DELAY, DELAY] > whole.run_covariance[DELAY, DELAY]

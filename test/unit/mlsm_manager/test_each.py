@@ -59,7 +59,6 @@ def cluster():
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; test_thesis_yaml maps a recording with every version")
 @pytest.mark.parametrize("is_shared", [False, True])
 def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, capsys, request, is_shared):
     scheduler = request.getfixturevalue("cluster").scheduler_address if is_shared else None

@@ -12,7 +12,7 @@ from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.surface_map.map_file import map_bytes, map_of_bytes
 from node_support.geometry import composed, transformed
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the solver and its parts are tested with every version")]
+pytestmark = pytest.mark.long
 
 HARBOUR = tour(14, direction=0.05)
 KILLED_AFTER = 9

@@ -155,7 +155,6 @@ def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path
     assert np.ptp(trajectory["corrected_x"]) > 1.0
 
 
-@pytest.mark.newest_only("slow; the test above maps without reported positions with every version")
 def test_an_odometry_that_was_said_overrules_what_the_recording_looks_like(tmp_path):
     done = run(BASIN, "--out", tmp_path, "--odometry", "thrusters")
     assert done.returncode == 0, done.stderr

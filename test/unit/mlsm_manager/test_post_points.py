@@ -9,7 +9,7 @@ from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.surface_points import Sights, SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan, Track
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; posts are compared with every version by other tests")]
+pytestmark = pytest.mark.long
 
 STRONG, WEAK = 100.0, 30.0
 WALL = np.column_stack([np.linspace(-10.0, 10.0, 41), np.full(41, 8.0)])

@@ -8,7 +8,7 @@ page = pytest.importorskip("mlsm_manager.report.page", reason="plotly is not ins
 from selenium.webdriver.common.by import By  # noqa: E402
 from selenium.webdriver.common.keys import Keys  # noqa: E402
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("about the browser; pages are written with every version")]
+pytestmark = pytest.mark.long
 
 BROWSER = ("--enable-unsafe-swiftshader", "--window-size=400,400", "--host-resolver-rules=MAP * ~NOTFOUND")
 BLOCKS, SCANS = 300_000, 200

@@ -13,7 +13,7 @@ from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 from node_support.geometry import composed
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; joint sessions are resumed with every version")]
+pytestmark = pytest.mark.long
 
 PARAMETERS = LocaliserParameters(speed_deviation=0.05)
 

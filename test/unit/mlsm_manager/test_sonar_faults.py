@@ -53,7 +53,6 @@ def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
 
 
 @pytest.mark.long
-@pytest.mark.newest_only("slow; a run is fitted without a fault with every version")
 @pytest.mark.parametrize(
     ("recording", "said", "most"),
     [

@@ -11,7 +11,7 @@ from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParamete
 from mlsm_manager.offline.suited_parameters import may_strafe
 from node_support.errors import RefusedInput
 
-pytestmark = [pytest.mark.long, pytest.mark.newest_only("slow; the solver and its parts are tested with every version")]
+pytestmark = pytest.mark.long
 
 PARTS = profile_values(OdometryKind.HOVERING)["parts_per_turn"]
 STOPS = np.array([[0.0, 0.0], [6.0, 7.0], [-8.0, 6.0], [-12.0, -6.0], [2.0, -8.0]])
