@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.compiled_distances import along_x, mean_distance
 from node_support.geometry import composed, inverse, rotated, seen_from, transformed
 
 MOST, FEWEST = 250, 40  # echoes of a scan: more tell nothing new, fewer nothing
@@ -67,6 +67,7 @@ class ScanPairs:
         self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
         self._pairs = self._chosen()
         self._known: Dict[Hypothesis, np.ndarray] = {}
+        self._ways: Dict[Tuple[int, Hypothesis], np.ndarray] = {}
 
     @property
     def tell(self) -> bool:
@@ -94,22 +95,29 @@ class ScanPairs:
         """Return how far (p,) [m] the scans of each pair lie apart."""
         if hypothesis not in self._known:
             needed = {number for pair in self._pairs for number in pair}
-            placed = {number: self._placed(self._heard[number], hypothesis) for number in needed}
-            trees = {number: cKDTree(placed[number]) for number in {first for first, _ in self._pairs}}
-            self._known[hypothesis] = np.array([_apart(trees[one], placed[other]) for one, other in self._pairs])
+            placed = {number: self._placed(number, hypothesis) for number in needed}
+            targets = {number: along_x(placed[number]) for number in {first for first, _ in self._pairs}}
+            self._known[hypothesis] = np.array([_apart(targets[one], placed[other]) for one, other in self._pairs])
         return self._known[hypothesis]
 
-    def _placed(self, heard: _Heard, hypothesis: Hypothesis) -> np.ndarray:
+    def _placed(self, number: int, hypothesis: Hypothesis, ranges: float = 1.0) -> np.ndarray:
+        """Return where echoes (n, 2) [m] of a scan are, with `ranges` times their distances from the sonar."""
         signs = np.array([1.0, -1.0 if hypothesis.is_over else 1.0])
         mount = np.array([self._sonar[0] + hypothesis.ahead, self._sonar[1] + hypothesis.aside, hypothesis.turn])
-        return transformed(composed(self._poses(heard.track, heard.times, hypothesis), mount), heard.points * signs)
+        in_base = transformed(mount, ranges * signs * self._heard[number].points)
+        return transformed(self._poses(number, hypothesis), in_base)
 
-    def _poses(self, track: Track, times: np.ndarray, hypothesis: Hypothesis) -> np.ndarray:
-        """Return where the vehicle was when beams came with the stamps `times` (n,) [s]."""
-        times = times + hypothesis.delay
-        side = -1.0 if hypothesis.is_mirrored else 1.0
-        poses = track.at(times) * [hypothesis.scale, side * hypothesis.scale, 1.0]
-        return composed(self._corrections.at(times), poses) if hypothesis.as_solved else poses
+    def _poses(self, number: int, hypothesis: Hypothesis) -> np.ndarray:
+        """Return where the vehicle was at each echo (n, 3) of a scan; mounts change nothing of it."""
+        went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0)
+        if (number, went) not in self._ways:
+            heard = self._heard[number]
+            times = heard.times + went.delay
+            side = -1.0 if went.is_mirrored else 1.0
+            poses = heard.track.at(times) * [went.scale, side * went.scale, 1.0]
+            poses = composed(self._corrections.at(times), poses) if went.as_solved else poses
+            self._ways[number, went] = poses
+        return self._ways[number, went]
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
         """Return the hypothesis under which scans lie closest."""
@@ -128,7 +136,7 @@ class ScanPairs:
 
     def near(self) -> "NearPairs":
         """Return all pairs of scans up to three apart, as they lie if nothing is wrong."""
-        pairs, apart = near_pairs([self._placed(one, self.honest) for one in self._heard])
+        pairs, apart = near_pairs([self._placed(number, self.honest) for number in range(len(self._heard))])
         begins = np.array([one.times[0] for one in self._heard])
         middles = np.array([one.times.mean() for one in self._heard])
         return NearPairs(pairs, begins, middles, apart)
@@ -139,9 +147,9 @@ class ScanPairs:
         """
         table, honest = np.empty((len(velocities), len(pairs))), self.honest
         for column, (one, other) in enumerate(pairs):
-            tree, later = cKDTree(self._placed(self._heard[one], honest)), self._placed(self._heard[other], honest)
+            earlier, later = along_x(self._placed(one, honest)), self._placed(other, honest)
             moves = velocities * (self._heard[other].times.mean() - self._heard[one].times.mean())
-            table[:, column] = [_apart(tree, later + move) for move in moves]
+            table[:, column] = [_apart(earlier, later + move) for move in moves]
         return table
 
     def in_odometry(self, velocity: np.ndarray, time: float) -> np.ndarray:
@@ -157,13 +165,11 @@ class ScanPairs:
         """
         table = np.empty((len(changes), len(pairs)))
         for column, (one, other) in enumerate(pairs):
-            tree, later = cKDTree(self._placed(self._heard[one], base)), self._heard[other]
-            centre = self._poses(later.track, later.times[-1:], base)[0, :2]
-            factors = {change.ranges for change in changes}
-            late = {one: self._placed(later._replace(points=one * later.points), base) - centre for one in factors}
+            earlier, centre = along_x(self._placed(one, base)), self._poses(other, base)[-1, :2]
+            late = {ranges: self._placed(other, base, ranges) - centre for ranges in {one.ranges for one in changes}}
             for row, (turn, ranges) in enumerate(changes):
-                turns = np.full(len(later.times), turn)
-                table[row, column] = _apart(tree, rotated(late[ranges], turns) + centre)
+                turns = np.full(len(late[ranges]), turn)
+                table[row, column] = _apart(earlier, rotated(late[ranges], turns) + centre)
         return table
 
     def typical_range(self) -> float:
@@ -193,14 +199,15 @@ class NearPairs(NamedTuple):
 
 def near_pairs(placed: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
     """Return the numbers (p, 2) of scans up to three apart, and how far (p,) [m] they lie apart; placed: (n, 2) m."""
-    trees = [cKDTree(places) for places in placed]
+    targets = [along_x(places) for places in placed]
     pairs = [(one, one + apart) for apart in _APART for one in range(len(placed) - apart)]
-    distances = [_apart(trees[one], placed[other]) for one, other in pairs]
+    distances = [_apart(targets[one], placed[other]) for one, other in pairs]
     return np.array(pairs, dtype=int).reshape(-1, 2), np.array(distances)
 
 
-def _apart(tree: cKDTree, places: np.ndarray) -> float:
-    return float(np.minimum(tree.query(places, distance_upper_bound=_FAR)[0], _FAR).mean())
+def _apart(targets: np.ndarray, places: np.ndarray) -> float:
+    """Return how far [m] `places` (n, 2) lie from `targets`, which are in the order of x."""
+    return mean_distance(targets, np.ascontiguousarray(places), _FAR)
 
 
 def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Optional[np.ndarray] = None) -> float:
