@@ -13,7 +13,7 @@ from nav_msgs.msg import Odometry
 
 from underwater_map_construction.msg import SonarScanLine
 
-SILENCE = 200.0, 320.0  # s into the run
+SILENCE = 120.0, 240.0  # s into the run
 KNOWN = 2.0  # m told, from which on the place is known
 FARTHEST = 3.0  # deviations that both fixes tell, of the way between them from the true one
 

@@ -8,14 +8,14 @@ import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from benchmarks.faults import shortened
+from benchmarks.harness import mapped_as
 from made_recordings import SECONDS, touring
 
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
-from mlsm_manager.offline.bag_mapping import mapped_bag, with_odometry_mended, with_steady_head
-from mlsm_manager.offline.map_bag import map_bag_arguments
+from mlsm_manager.offline.bag_mapping import with_odometry_mended, with_steady_head
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes
@@ -264,16 +264,25 @@ def test_a_mount_that_is_put_right_has_no_cause_left(fault):
     assert found_in(recording.mounted(mount.turn, mount.is_over)).causes == []
 
 
-@pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        (rare.positions_swapped, "direction of motion is turned by "),
-        (rare.axes_swapped, "positions are mirrored beside its headings"),
-    ],
-)
-def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_fine(fault, said):
-    whole, options = shortened(WHOLE, 200.0), map_bag_arguments(["recording", "--out", "nowhere"])
-    found, right = mapped_bag(fault(whole), options), mapped_bag(whole, options)
+SHORT = shortened(WHOLE, 200.0)
+FAULTS = {
+    "direction of motion is turned by ": rare.positions_swapped,
+    "positions are mirrored beside its headings": rare.axes_swapped,
+}
+
+
+@pytest.fixture(scope="module")
+def mapped():
+    """Return what is mapped of recordings whose ranges are 2 % short, as a parameter says, by what is said of them."""
+    reported = rare.sound_faster(SHORT, 1.0 / 1.02)
+    recordings = {"": reported, **{said: fault(reported) for said, fault in FAULTS.items()}}
+    return {said: mapped_as(recording, "--set", "range_scale=1.02") for said, recording in recordings.items()}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("said", FAULTS)
+def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_fine(mapped, said):
+    found, right = mapped[said], mapped[""]
     trust = found.findings.trust
     assert f"mended: the odometry's {said}" in trust.line
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
@@ -281,16 +290,16 @@ def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_f
     assert np.hypot(*(apart - apart[0]).T).max() < 1.0
 
 
-def test_a_recording_that_is_mapped_anew_has_its_ranges_corrected_once():
-    options = map_bag_arguments(["recording", "--out", "nowhere", "--set", "range_scale=1.02"])
-    swapped = rare.positions_swapped(shortened(WHOLE, 200.0))
-    mapped = mapped_bag(swapped, options).recording
-    assert mapped.beams[0].beam.range_resolution == pytest.approx(1.02 * swapped.beams[0].beam.range_resolution)
+@pytest.mark.long
+@pytest.mark.parametrize("said", FAULTS)
+def test_a_recording_that_is_mapped_anew_has_its_ranges_corrected_once(mapped, said):
+    beams = mapped[said].recording.beams
+    assert beams[0].beam.range_resolution == pytest.approx(SHORT.beams[0].beam.range_resolution)
 
 
+@pytest.mark.long
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
-    options = map_bag_arguments(["recording", "--out", "nowhere", "--fix-mount"])
-    trust = mapped_bag(broken.mount_turned(shortened(WHOLE, 200.0), 120.0), options).findings.trust
+    trust = mapped_as(broken.mount_turned(SHORT, 120.0), "--fix-mount").findings.trust
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
     assert "mended: the sonar is turned by" in trust.line
 
@@ -333,6 +342,7 @@ def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
     assert slipped.begin == pytest.approx(START + 60.0, abs=10.0)
 
 
+@pytest.mark.long
 def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows():
     drifting = broken.compass_drifts(WHOLE, MIDDLE, 4.0)
     localiser = LocaliserParameters().build_localiser(drifting.sonar_in_base)
