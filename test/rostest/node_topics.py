@@ -1,4 +1,3 @@
-#!/usr/bin/env python3
 """The table behind docs/nodes.md and --help lists the topics and services that the nodes really have."""
 
 import unittest
@@ -6,7 +5,7 @@ from typing import Dict, Set
 
 import rosgraph
 import rospy
-from graph import Inbox, run, wait_until
+from graph import Inbox, wait_until
 from sensor_msgs.msg import Image
 
 from mlsm_manager.ros.map_publisher import has_octomap_messages
@@ -71,7 +70,3 @@ def _told(node: str, role: Role) -> Set[str]:
             name = rospy.resolve_name(one.name, caller_id=f"/{node}")
             told |= {name, f"{name}/cloud"} if ".../cloud" in one.text else {name}
     return told - COMMON
-
-
-if __name__ == "__main__":
-    run(NodeTopics)

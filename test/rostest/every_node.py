@@ -1,10 +1,9 @@
 #!/usr/bin/env python3
-"""Parameters at the start of nodes and while they run: what is taken, what is refused, and keys of older versions."""
+"""Every node: its topics, and what it takes and refuses of parameters at its start and while it runs."""
 
 import signal
 import subprocess
 import sys
-import unittest
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import Field
 from enum import Enum
@@ -13,6 +12,7 @@ from typing import Any, Dict, List, Tuple
 import rospy
 from dynamic_reconfigure.client import Client
 from graph import PACKAGE, PACKAGE_ROOT, PATIENCE, Diagnostics, ended, run, wait_until
+from node_topics import NodeTopics
 
 sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
 
@@ -71,7 +71,7 @@ def start(case: Tuple[int, Tuple[str, str, str]]) -> "subprocess.CompletedProces
     return ended(command, 2 * PATIENCE, ROSCONSOLE_FORMAT="${message}")
 
 
-class Parameters(unittest.TestCase):
+class EveryNode(NodeTopics):
     """Sends what the parameter dataclasses say is not allowed, and a little that is."""
 
     def test_keys_of_an_older_version_are_named_in_one_warning_and_taken(self) -> None:
@@ -142,4 +142,4 @@ class Parameters(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    run(Parameters)
+    run(EveryNode)
