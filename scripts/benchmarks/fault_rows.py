@@ -56,6 +56,7 @@ _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", 
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"
+_REVERSED = "compass counts the other way"
 _OFTEN = {"at": 60.0, "every": 60.0}
 
 ROWS = (
@@ -127,11 +128,13 @@ ROWS = (
     FaultRow("odometry counts z down", rare.odometry_mirrored, _OVER),
     FaultRow("odometry in feet", partial(broken.odometry_scaled, factor=3.28), _LENGTHS),
     FaultRow("odometry {} s late", rare.odometry_late, _STAMPS, "seconds", 3.0),
-    FaultRow("x and y of the DVL swapped", rare.positions_swapped, _MOVES),
+    FaultRow("x and y of the DVL swapped", rare.positions_swapped, f"{_MOVES}|moves are mirrored"),
     FaultRow("x and y of odom swapped", rare.axes_swapped, "positions are mirrored"),
     FaultRow("compass sticks", rare.compass_sticks, "compass stuck", begins=True),
     FaultRow("compass trembles by {} deg", rare.compass_noisy, "compass trembles", "degrees", 5.0),
     FaultRow("compass {} deg off, positions right", rare.compass_off, _MOVES, "degrees", 60.0),
+    FaultRow("compass reversed, positions right", rare.compass_reversed, _REVERSED, others={"positions_follow": False}),
+    FaultRow("compass reversed", rare.compass_reversed, f"{_REVERSED}|{_OVER}", others={"positions_follow": True}),
     FaultRow("mount tilted {} deg", rare.mount_tilted, "is tilted", "degrees", 20.0),
     FaultRow("head loses {} deg each minute", rare.head_loses_steps, f"{_SLIPPED}|{_DRIFTS}", "degrees", 3.0),
     FaultRow("head's angles tremble by {} deg", rare.head_trembles, "angles tremble", "degrees", 6.0),

@@ -69,6 +69,11 @@ def compass_off(recording: Recording, degrees: float) -> Recording:
     return with_compass_error(recording, np.full(len(recording.track.times), np.radians(degrees)), False)
 
 
+def compass_reversed(recording: Recording, positions_follow: bool) -> Recording:
+    """Let the heading count the other way; positions are right, or integrated with it."""
+    return with_compass_error(recording, -2.0 * recording.track.poses[:, 2], positions_follow)
+
+
 def mount_tilted(recording: Recording, degrees: float) -> Recording:
     """Let the sonar's plane be tilted against what tf says."""
     cos, sin = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))

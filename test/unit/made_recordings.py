@@ -28,11 +28,23 @@ def wandering() -> Recording:
     return _along(lambda angle: (12.0 * np.cos(0.9 * angle) - 2.0, 8.0 * np.sin(1.7 * angle + 0.1 * angle**2)))
 
 
-def _along(way: Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]]) -> Recording:
-    """Return a recording of a vehicle that is at way(angle), x and y [m], while the angle [rad] grows to 4 pi."""
+def strafing() -> Recording:
+    """Return as much of a vehicle on the ellipse that looks up to 86 degrees aside of where it goes."""
+    return _along(lambda angle: (12.0 * np.cos(angle) - 2.0, 8.0 * np.sin(angle)), lambda angle: 1.5 * np.sin(angle))
+
+
+def _along(
+    way: Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]],
+    aside: Callable[[np.ndarray], np.ndarray] = np.zeros_like,
+) -> Recording:
+    """Return a recording of a vehicle that is at way(angle), x and y [m], while the angle [rad] grows to 4 pi.
+
+    aside: by how much [rad] it looks to the left of where it goes.
+    """
     times = _START + np.arange(0.0, SECONDS + 0.05, 0.1)
-    x, y = way(4.0 * np.pi * (times - _START) / SECONDS)
-    yaw = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x)))
+    angles = 4.0 * np.pi * (times - _START) / SECONDS
+    x, y = way(angles)
+    yaw = np.unwrap(np.arctan2(np.gradient(y), np.gradient(x))) + aside(angles)
     track = Track(times, np.column_stack([x, y, yaw]))
     stamps = np.arange(_START + 1.0, _START + SECONDS - 1.0, _BEAM)
     poses, heads = track.at(stamps), _STEP * np.arange(len(stamps))

@@ -109,14 +109,37 @@ def integrated(start: np.ndarray, steps: np.ndarray) -> np.ndarray:
     return np.column_stack([places.real, places.imag, yaws])
 
 
-def with_positions_turned(track: Track, turn: float, is_mirrored: bool) -> Track:
-    """Return a track whose positions are turned by `turn` [rad], once y counts the other way where `is_mirrored`.
+class Mirror(Enum):
+    """Of what y counts the other way: of positions in odom, or of moves in the vehicle's frame."""
 
-    It begins where it began, and headings stay: so are moves turned of a DVL that is mounted turned.
-    """
+    NOTHING = "nothing"
+    POSITIONS = "positions"
+    MOVES = "moves"
+
+    def of(self, track: Track) -> Track:
+        """Return a track without it, or with it; it begins where it began, and headings stay."""
+        if self is Mirror.NOTHING:
+            return track
+        start, signs = track.poses[0], np.array([1.0, -1.0, 1.0])
+        if self is Mirror.MOVES:
+            return track.with_poses(integrated(start, signs * seen_from(track.poses[:-1], track.poses[1:])))
+        return track.with_poses(np.append(start[:2], 0.0) + signs * (track.poses - np.append(start[:2], 0.0)))
+
+
+def with_positions_turned(track: Track, turn: float) -> Track:
+    """Return a track whose positions are turned by `turn` [rad]; it begins where it began, and headings stay."""
     start = track.poses[0, :2]
-    gone = (track.poses[:, :2] - start) * [1.0, -1.0 if is_mirrored else 1.0]
-    return track.with_poses(np.column_stack([start + rotated(gone, np.full(len(gone), turn)), track.poses[:, 2]]))
+    gone = rotated(track.poses[:, :2] - start, np.full(len(track.poses), turn))
+    return track.with_poses(np.column_stack([start + gone, track.poses[:, 2]]))
+
+
+def with_headings_reversed(track: Track, are_reckoned: bool) -> Track:
+    """Return a track whose headings count the other way; are_reckoned: positions follow from moves and headings."""
+    poses = track.poses * [1.0, 1.0, -1.0]
+    if not are_reckoned:
+        return track.with_poses(poses)
+    steps = seen_from(track.poses[:-1], track.poses[1:]) * [1.0, 1.0, -1.0]
+    return track.with_poses(integrated(poses[0], steps))
 
 
 def _after(times: np.ndarray, _: np.ndarray, begin: float) -> np.ndarray:

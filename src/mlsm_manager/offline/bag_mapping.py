@@ -14,7 +14,7 @@ from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind, strafes
-from mlsm_manager.odometry.faults import with_positions_turned
+from mlsm_manager.odometry.faults import Mirror
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings, Trust
@@ -33,10 +33,10 @@ from mlsm_manager.offline.suited_parameters import (
 )
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
-from mlsm_manager.self_check.causes import CERTAIN, Cause, Fault, of_steps, of_stuck, ranked
+from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault, of_steps, of_stuck, ranked
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import moves_are_turned
-from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, of_odometry, turn_text
+from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.motion_findings import goes_on_with_other_ranges
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -105,10 +105,10 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     _tell_of_refused(replayed, options)
     causes = [*causes, *over, *companions]
     found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
-    if not odometry.moves_turned and _moves_are_turned(recording, found.mount, options):
-        track = with_positions_turned(recording.track, -found.mount.turn, found.mount.is_mirrored)
-        known = odometry._replace(moves_turned=True)
-        return _mapped(recording.with_track(track), [*causes, *mounted, of_odometry(found.mount)], known, options)
+    if not odometry.put_right.text and _moves_are_turned(recording, found.mount, options):
+        track, cause, assumed = put_right(recording.track, found.mount)
+        known = odometry._replace(put_right=assumed)
+        return _mapped(recording.with_track(track), [*causes, *mounted, cause], known, options)
     of_echoes = [*mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
     refined, refitted = None, []
@@ -129,7 +129,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     causes = ranked([*causes, *of_run])
     findings, further = None, [signs.turns(), *refitted]
     if replayed.solver is not None:
-        findings = Findings.of(replayed, refined, further, causes, odometry.assumed or _assumed_mount(mounted))
+        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, mounted))
     known = parameters if findings is None else findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
@@ -191,7 +191,7 @@ def _positions_mislead(
 
 def _moves_are_turned(recording: Recording, mount: Hypothesis, options: Namespace) -> bool:
     """Return whether the odometry's moves are turned or mirrored, unless a turned sonar is to be put right."""
-    if mount.is_mirrored:
+    if mount.mirrored is not Mirror.NOTHING:
         return True
     seems_turned = mount.turn != 0.0 and not mount.is_over and not options.fix_mount
     return seems_turned and moves_are_turned(recording.track, mount.turn)
@@ -230,7 +230,7 @@ def _heard(
     """
     scans, mended = _scans(recording, extractor, options), []
     found = echo_findings(scans, recording.sonar_in_base) if options.fix_mount else EchoFindings([], AS_TOLD)
-    if found.mount != AS_TOLD and not found.mount.is_mirrored:
+    if found.mount != AS_TOLD and found.mount.mirrored is Mirror.NOTHING:
         recording = recording.mounted(found.mount.turn, found.mount.is_over)
         scans = _scans(recording, extractor, options)
         mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes]
@@ -242,9 +242,11 @@ def _heard(
     return _Heard(mirrored, _scans(mirrored, extractor, options), mended, signs, [_OVER])
 
 
-def _assumed_mount(mended: Sequence[Cause]) -> str:
-    """Return that the mount was put right by the echoes, if it was: to some degrees only, of which no check tells."""
-    return "the mount is as the echoes tell it, to some degrees; correct tf and map again" if mended else ""
+def _assumed(odometry: OdometryFound, mended: Sequence[Cause]) -> Assumption:
+    """Return what no check tells of: of the odometry, or that the mount was put right by the echoes, if it was."""
+    if odometry.assumed.text or not mended:
+        return odometry.assumed
+    return Assumption("the mount is as the echoes tell it, to some degrees; correct tf and map again", 0.0)
 
 
 def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:

@@ -1,6 +1,6 @@
 """What the joint solver found in a run besides the path: the calibration, and whether the run can be trusted."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, fields, replace
 from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
 
 import numpy as np
@@ -16,7 +16,7 @@ from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import Cause, widened
+from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.headline import headline, is_told
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
@@ -113,7 +113,8 @@ class Trust:
     """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
 
     matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
-    nobody measured and the path rests on, if anything.
+    nobody measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing
+    tells.
     """
 
     verdicts: List[Verdict]
@@ -122,12 +123,13 @@ class Trust:
     matched: int
     causes: Sequence[Cause] = ()
     assumed: str = ""
+    if_so: float = np.nan
 
     @property
     def line(self) -> str:
         """One line for people."""
         deviation, begin = float(self.deviations.max()), float(self.times[0])
-        return headline(self.verdicts, self.matched, deviation, self.causes, begin, self.assumed)
+        return headline(self.verdicts, self.matched, deviation, self.causes, begin, self.assumed, self.if_so)
 
     @property
     def deviations(self) -> np.ndarray:
@@ -137,7 +139,7 @@ class Trust:
     @property
     def uncertainty(self) -> Optional[Uncertainty]:
         """What picture and report show of it; None where nothing can be said of the position."""
-        told = is_told(self.verdicts, self.matched)
+        told = is_told(self.verdicts, self.matched, self.assumed, self.if_so)
         return Uncertainty(self.times, self.covariances, self.doubtful) if told else None
 
     @property
@@ -170,7 +172,7 @@ def _trust(
     calibration: Calibration,
     further: Sequence[Verdict],
     causes: Sequence[Cause],
-    assumed: str,
+    assumed: Assumption,
 ) -> Trust:
     """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
     solver = replayed.solver
@@ -187,7 +189,8 @@ def _trust(
         covariances = refined.batch.pose_covariances[:, :2, :2] + refined.motion.spread(times)
         places = solution.node_places(np.arange(len(times)))
         lengths = np.full(len(times), solver.estimates[-1].length_deviation)
-        expected = expected_deviations(places - places[0], lengths, solver.heading_deviation)
+        directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
+        expected = expected_deviations(places - places[0], lengths, directions)
     start, before = float(solver.log.node_times[0]), Calibration.expected(solver)
     verdicts = [
         *_against_odometry_or_before(replayed, path, solution, turns.times),
@@ -203,8 +206,12 @@ def _trust(
     # A path that went astray may be far too short, and an odometry without positions has none.
     ways = max((places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
     covariances = widened(covariances, times, ways, causes)
-    verdicts = [verdict.assuming(assumed) for verdict in (*verdicts, *further)]
-    return Trust(verdicts, times, covariances, replayed.matched, causes, assumed)
+    verdicts = [verdict.assuming(assumed.text) for verdict in (*verdicts, *further)]
+    trust = Trust(verdicts, times, covariances, replayed.matched, causes, assumed.text)
+    if np.isnan(assumed.turn):
+        return trust
+    if_not = widened(covariances, times, ways, [Cause(assumed.text, CERTAIN, turn=assumed.turn)])
+    return replace(trust, covariances=if_not, if_so=float(trust.deviations.max()))
 
 
 def _radii(covariances: np.ndarray) -> np.ndarray:
@@ -253,7 +260,7 @@ class Findings:
     @classmethod
     def of(
         cls, replayed: Replayed, refined: Optional[Refined], further: Sequence[Verdict], causes: Sequence[Cause],
-        assumed: str = "",
+        assumed: Assumption = NOTHING_ASSUMED,
     ) -> "Findings":  # fmt: skip
         """Return what was found in a run that the joint solver has followed.
 

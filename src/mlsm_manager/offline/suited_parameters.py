@@ -10,6 +10,7 @@ from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_va
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import ReportedMotion, Scan
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption
 from mlsm_manager.self_check.map_checks import scans_go_on
 from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts
 
@@ -51,14 +52,14 @@ _WITHOUT_MOTION: Dict[Optional[SweepMotion], Dict[str, float]] = {
 class OdometryFound(NamedTuple):
     """kind: of the odometry. reason: one line that says why. motion: what sweeps tell where nothing was recorded.
 
-    is_said: somebody says that the vehicle stood still. moves_turned: or mirrored, by the echoes.
+    is_said: somebody says that the vehicle stood still. put_right: what that rests on, where echoes told to do it.
     """
 
     kind: OdometryKind
     reason: str
     motion: Optional[SweepMotion] = None
     is_said: bool = False
-    moves_turned: bool = False
+    put_right: Assumption = NOTHING_ASSUMED
 
     @property
     def name(self) -> str:
@@ -69,12 +70,11 @@ class OdometryFound(NamedTuple):
         return names.get(self.motion, "not told, held still")
 
     @property
-    def assumed(self) -> str:
+    def assumed(self) -> Assumption:
         """What the path rests on though nothing was measured of it; empty where something was."""
-        if self.moves_turned:
-            return "the odometry's direction of motion is as the echoes tell it, if the compass is right"
-        untold = "the vehicle is held still, and nothing tells whether it was"
-        return untold if self.motion is SweepMotion.UNTOLD else ""
+        if self.motion is SweepMotion.UNTOLD:
+            return Assumption("the vehicle is held still, and nothing tells whether it was")
+        return self.put_right
 
 
 def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:

@@ -61,6 +61,15 @@ class Track:
         return seen_from(before, after) / (last - first)
 
 
+def joined(tracks: Sequence[Track]) -> Track:
+    """Return one track of all poses; of several at one time the first."""
+    different = list({id(track): track for track in tracks}.values())
+    if len(different) == 1:
+        return different[0]
+    times, first = np.unique(np.concatenate([track.times for track in different]), return_index=True)
+    return Track(times, np.concatenate([track.poses for track in different])[first])
+
+
 class ReportedMotion:
     """How far T_odom_base changed since it was first known: what an odometry tells of itself.
 

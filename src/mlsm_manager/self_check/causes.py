@@ -1,7 +1,7 @@
 """What is wrong with a run, when and by how much; the evidence ranks several."""
 
 from dataclasses import dataclass
-from typing import Any, Dict, Iterable, List, Optional, Sequence, Union
+from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Union
 
 import numpy as np
 
@@ -54,6 +54,19 @@ class Cause:
     def line(self, run_begin: float) -> str:
         """Return it for people; run_begin: s."""
         return self.text if np.isnan(self.begin) else f"{self.text} at {moment(max(self.begin, run_begin), run_begin)}"
+
+
+class Assumption(NamedTuple):
+    """What nobody measured and the path rests on. text: one clause; empty where there is none.
+
+    turn: rad, by how much the path is turned if it is not so; NaN where nothing can be said of the position if it is.
+    """
+
+    text: str
+    turn: float = np.nan
+
+
+NOTHING_ASSUMED = Assumption("")
 
 
 def ranked(causes: Iterable[Cause]) -> List[Cause]:

@@ -5,10 +5,10 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
-from mlsm_manager.odometry.faults import FaultKind, MotionFault
+from mlsm_manager.odometry.faults import FaultKind, Mirror, MotionFault, with_headings_reversed, with_positions_turned
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
-from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, ranked
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Cause, ranked
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
@@ -21,6 +21,9 @@ _SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0,
 _RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-5.0, 6.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
+_NATS_MIRRORED = 30.0  # by which it must be likelier: vehicles that go ahead show wrong ones by 7, others right by 60
+_SIDES = tuple(Hypothesis(is_over=is_over, mirrored=mirrored) for mirrored in Mirror for is_over in (False, True))
+_AS_TOLD = "the odometry is as the echoes tell it"
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 
 
@@ -50,7 +53,7 @@ def echo_findings(
     honest, best, tried = pairs.honest, *_turned(pairs)
     # The more causes are tried the likelier one fits by chance.
     nats = pairs.evidence(best, honest) - np.log(tried)
-    is_flipped = best.is_over or best.is_mirrored
+    is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
     if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
@@ -64,18 +67,31 @@ def _reports_positions(scans: Sequence[Scan]) -> bool:
 
 
 def _turned(pairs: ScanPairs) -> Tuple[Hypothesis, int]:
-    """Return the likeliest mount, and how many were tried."""
+    """Return the likeliest mount, and how many were tried; of several that are about as likely that with fewest errors.
+
+    What mirrors an odometry that goes straight ahead does little else than to turn it.
+    """
     angles = np.arange(-np.pi, np.pi, _COARSE)
-    sides = (AS_TOLD, Hypothesis(is_over=True), Hypothesis(is_mirrored=True))
-    tried = [one for side in sides for one in around(side, "turn", angles)]
-    coarse = pairs.best(tried)
-    return pairs.best(around(coarse, "turn", coarse.turn + _FINE * np.arange(-4, 5))), len(tried)
+    coarse = [pairs.best(around(side, "turn", angles)) for side in _SIDES]
+    fine = [pairs.best(around(one, "turn", one.turn + _FINE * np.arange(-4, 5))) for one in coarse]
+    best = pairs.best(fine)
+    simple = next(one for one in fine if one == best or pairs.evidence(best, one) < _NATS_MIRRORED)
+    return simple, len(_SIDES) * len(angles)
+
+
+_REVERSED = {
+    Mirror.POSITIONS: "the compass counts the other way, beside positions that are right",
+    Mirror.MOVES: "the compass counts the other way, and positions are reckoned with it",
+}
 
 
 def turn_text(found: Hypothesis) -> str:
     """Return what is said of a mount."""
-    if found.is_mirrored:
-        return "the odometry's positions are mirrored beside its headings: x and y are swapped, or one is reversed"
+    if found.mirrored is not Mirror.NOTHING and found.is_over:
+        return _REVERSED[found.mirrored]
+    if found.mirrored is not Mirror.NOTHING:
+        mirrored = f"the odometry's {found.mirrored.value} are mirrored beside its headings"
+        return f"{mirrored}: x and y are swapped, or one is reversed"
     turn = (np.degrees(found.turn) + 180.0) % 360.0 - 180.0
     angle = f"turned by {turn:.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg against tf"
     if not found.is_over:
@@ -86,18 +102,35 @@ def turn_text(found: Hypothesis) -> str:
     return side if abs(turn) < np.degrees(_TURN_TOLD) else f"{side}; it is {angle} besides"
 
 
-def of_odometry(found: Hypothesis) -> Cause:
-    """Return the cause for an odometry whose positions were mirrored or whose moves were turned, and are put right.
+class PutRight(NamedTuple):
+    """track: T_odom_base without what was wrong with it: `cause`. assumed: what that rests on."""
 
-    Where it is the compass that is off, beside positions that are right, the path is turned by as much.
+    track: Track
+    cause: Cause
+    assumed: Assumption
+
+
+def put_right(track: Track, found: Hypothesis) -> PutRight:
+    """Return an odometry whose positions were mirrored or whose moves were turned, or whose headings were reversed.
+
+    Where headings were, the sonar or the compass may be turned besides; that is left as it is.
     """
-    if found.is_mirrored:
-        return Cause(turn_text(found), CERTAIN, is_mended=True, turn=TURN_DEVIATION)
+    if found.is_over:
+        return _certainly(with_headings_reversed(track, found.mirrored is Mirror.MOVES), found)
+    right = with_positions_turned(found.mirrored.of(track), -found.turn)
+    if found.mirrored is not Mirror.NOTHING:
+        return _certainly(right, found)
     angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg"
     text = f"the odometry's direction of motion is turned by {angle} against the vehicle"
     if abs(abs(found.turn) - np.pi / 2.0) < _SWAPPED:
         text += ", or its x and y are swapped"
-    return Cause(f"{text}, or the compass is off", CERTAIN, is_mended=True, turn=abs(found.turn))
+    cause = Cause(f"{text}, or the compass is off", CERTAIN, is_mended=True, turn=TURN_DEVIATION)
+    return PutRight(right, cause, Assumption(f"{_AS_TOLD}, and the compass is right", abs(found.turn)))
+
+
+def _certainly(track: Track, found: Hypothesis) -> PutRight:
+    cause = Cause(turn_text(found), CERTAIN, is_mended=True, turn=TURN_DEVIATION)
+    return PutRight(track, cause, Assumption(_AS_TOLD, 0.0))
 
 
 def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:

@@ -14,36 +14,42 @@ FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one wh
 
 def headline(
     verdicts: Sequence[Verdict], matched: int, deviation: float, causes: Sequence[Cause] = (), begin: float = 0.0,
-    assumed: str = "",
+    assumed: str = "", if_so: float = np.nan,
 ) -> str:  # fmt: skip
     """Return what the checks of a run say.
 
     causes: of what is wrong, ranked, in a run that began at `begin` [s]. matched: scans that were compared with the
     surfaces of others. deviation: m, the largest stated one, root of the sum of both variances. assumed: what nobody
-    measured and the path rests on, if anything.
+    measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing tells.
     """
-    by_answer = {answer: [one for one in verdicts if one.answer is answer] for answer in Answer}
-    doubtful, missing = by_answer[Answer.DOUBTFUL], by_answer[Answer.NOT_MEASURED]
-    within = f"position within {WITHIN * deviation:.1f} m"
+    fine, doubtful, missing = ([one for one in verdicts if one.answer is answer] for answer in Answer)
+    within = _within(deviation if np.isnan(if_so) else if_so)
     wrong = [cause.line(begin) for cause in causes if not cause.is_mended]
     mended = "".join(f"; mended: {cause.line(begin)}" for cause in causes if cause.is_mended)
+    known = f"position {within}" if is_told(verdicts, matched, assumed, if_so) else ""
+    nothing = "nothing can be said of the position"
     if wrong or doubtful:
         said = "; ".join([*wrong, *(one.text for one in doubtful)])
-        known = f"at best {within}" if is_told(verdicts, matched) else "nothing can be said of the position"
-        return f"trust: DOUBTFUL: {said}{mended}; {known}"
-    reason = f"{counted(matched, 'scan')} matched, {FEWEST_MATCHED} needed" if matched < FEWEST_MATCHED else ""
-    if not reason and not by_answer[Answer.FINE]:
+        return f"trust: DOUBTFUL: {said}{mended}; {f'at best {known}' if known else nothing}"
+    if matched < FEWEST_MATCHED or not fine:
         reason = assumed or f"none of {len(verdicts)} checks had enough data"
-    if reason:
-        return f"trust: NOT MEASURED: {reason}; nothing can be said of the position{mended}"
+        if matched < FEWEST_MATCHED:
+            reason = f"{counted(matched, 'scan')} matched, {FEWEST_MATCHED} needed"
+        otherwise = f", {_within(deviation)} if not" if deviation > if_so else ""
+        return f"trust: NOT MEASURED: {reason}; {f'{known} if so{otherwise}' if known else nothing}{mended}"
     if missing:
-        names, count = ", ".join(one.name for one in missing), len(by_answer[Answer.FINE])
-        fine = f"{count} of {len(verdicts)} checks are fine, NOT MEASURED: {names}"
-        return f"trust: {fine}; {within} if these are fine too{mended}"
-    return f"trust: all {len(verdicts)} checks are fine, nothing contradicts: {within}{mended}"
+        names = ", ".join(one.name for one in missing)
+        told = f"{len(fine)} of {len(verdicts)} checks are fine, NOT MEASURED: {names}"
+        return f"trust: {told}; {known} if these are fine too{mended}"
+    return f"trust: all {len(verdicts)} checks are fine, nothing contradicts: {known}{mended}"
 
 
-def is_told(verdicts: Sequence[Verdict], matched: int) -> bool:
-    """Return whether the checks of a run say anything of the position."""
+def _within(deviation: float) -> str:
+    return f"within {WITHIN * deviation:.1f} m"
+
+
+def is_told(verdicts: Sequence[Verdict], matched: int, assumed: str = "", if_so: float = np.nan) -> bool:
+    """Return whether the checks of a run say anything of the position; arguments as those of `headline`."""
     answers = {verdict.answer for verdict in verdicts}
-    return Answer.DOUBTFUL in answers or (Answer.FINE in answers and matched >= FEWEST_MATCHED)
+    is_fine = Answer.FINE in answers or (not np.isnan(if_so) and any(one.text == assumed for one in verdicts))
+    return Answer.DOUBTFUL in answers or (is_fine and matched >= FEWEST_MATCHED)

@@ -8,7 +8,8 @@ from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.odometry.faults import Mirror
+from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.compiled_distances import along_x, mean_distance
 from node_support.geometry import composed, inverse, rotated, seen_from, transformed
 
@@ -27,14 +28,14 @@ _SCALES = np.arange(0.6, 1.65, 0.1)  # of distances that thrusters report
 class Hypothesis:
     """What may be wrong. turn: rad, of the sonar against tf, counter-clockwise. is_over: it hangs the other way round.
 
-    is_mirrored: reported positions are, so that y counts the other way, but headings are not.
+    mirrored: of what the odometry reports, but not its headings; if the sonar is_over as well, these are instead.
     ahead, aside: m, of the sonar's true place from that in tf. scale: true over reported distances. delay: s by which
     beams are later than their stamps. as_solved: the vehicle went as the solver found it, not as the odometry says.
     """
 
     turn: float = 0.0
     is_over: bool = False
-    is_mirrored: bool = False
+    mirrored: Mirror = Mirror.NOTHING
     ahead: float = 0.0
     aside: float = 0.0
     scale: float = 1.0
@@ -46,14 +47,10 @@ AS_TOLD = Hypothesis()
 
 
 class _Heard(NamedTuple):
-    """points: (n, 2) m from the sonar, along base_link's axes, each at its own beam, of `times` (n,) s.
-
-    track: T_odom_base.
-    """
+    """points: (n, 2) m from the sonar, along base_link's axes, each at its own beam, of `times` (n,) s."""
 
     points: np.ndarray
     times: np.ndarray
-    track: Track
 
 
 class ScanPairs:
@@ -65,6 +62,7 @@ class ScanPairs:
         """sonar_in_base: (2,) m, by tf. corrections: T_map_odom as the solver found it; None where none did yet."""
         self._sonar, self._corrections = sonar_in_base, corrections
         self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
+        self._tracks = {Mirror.NOTHING: joined([scan.track for scan in scans])} if scans else {}
         self._pairs = self._chosen()
         self._known: Dict[Hypothesis, np.ndarray] = {}
         self._ways: Dict[Tuple[int, Hypothesis], np.ndarray] = {}
@@ -82,7 +80,7 @@ class ScanPairs:
     def _chosen(self) -> List[Tuple[int, int]]:
         """Return pairs of numbers between which the vehicle moved by the odometry, in the order of time."""
         found = []
-        ends = [one.track.at(one.times[-1]) for one in self._heard]
+        ends = [self._tracks[Mirror.NOTHING].at(one.times[-1]) for one in self._heard]
         for number in range(len(ends)):
             for apart in _APART:
                 if number + apart < len(ends):
@@ -111,13 +109,17 @@ class ScanPairs:
         """Return where the vehicle was at each echo (n, 3) of a scan; mounts change nothing of it."""
         went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0)
         if (number, went) not in self._ways:
-            heard = self._heard[number]
-            times = heard.times + went.delay
-            side = -1.0 if went.is_mirrored else 1.0
-            poses = heard.track.at(times) * [went.scale, side * went.scale, 1.0]
+            times = self._heard[number].times + went.delay
+            poses = self._track(went.mirrored).at(times) * [went.scale, went.scale, 1.0]
             poses = composed(self._corrections.at(times), poses) if went.as_solved else poses
             self._ways[number, went] = poses
         return self._ways[number, went]
+
+    def _track(self, mirrored: Mirror) -> Track:
+        """Return what the odometry said, or would have if what is mirrored were not."""
+        if mirrored not in self._tracks:
+            self._tracks[mirrored] = mirrored.of(self._tracks[Mirror.NOTHING])
+        return self._tracks[mirrored]
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
         """Return the hypothesis under which scans lie closest."""
@@ -226,7 +228,7 @@ def _heard(scan: Scan, sonar_in_base: np.ndarray) -> _Heard:
     chosen = slice(None, None, -(-len(scan) // MOST))
     order = np.argsort(scan.times[chosen], kind="stable")
     times, points = scan.times[chosen][order], scan.points[chosen, :2][order]
-    return _Heard(transformed(inverse(scan.track.at(times)), points) - sonar_in_base, times, scan.track)
+    return _Heard(transformed(inverse(scan.track.at(times)), points) - sonar_in_base, times)
 
 
 def around(base: Hypothesis, name: str, values: Iterable[float]) -> List[Hypothesis]:

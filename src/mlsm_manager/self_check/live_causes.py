@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.odometry.faults import FaultKind
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.motion_findings import MotionFindings, motion_findings
@@ -59,7 +59,7 @@ class LiveCauses:
                 return
             self._is_new, scans, places = False, list(self._scans), self._places
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
-        track = _track(scans)
+        track = joined([scan.track for scan in scans])
         of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
         path = composed(corrections.at(track.times), track.poses)
         of_beams, spread = standing_causes(scans, track, path), np.zeros((2, 2))
@@ -103,9 +103,3 @@ def _motion_of(run: Solution, suspected: Sequence[Fault]) -> MotionFindings:
     track = run.log.odometry.track_from(-np.inf)
     motion = motion_findings(run, fit_of(run), track, suspected)
     return motion.with_course(track.with_poses(motion.run.path(track.times)))
-
-
-def _track(scans: Sequence[Scan]) -> Track:
-    """Return T_odom_base of all scans."""
-    times, first = np.unique(np.concatenate([scan.track.times for scan in scans]), return_index=True)
-    return Track(times, np.concatenate([scan.track.poses for scan in scans])[first])

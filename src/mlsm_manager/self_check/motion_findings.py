@@ -56,7 +56,7 @@ class MotionFindings:
 
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
-    nodes.
+    nodes. mounts: rad, deviation of the direction in which sonar and odometry are mounted, where nothing tells it.
     """
 
     run: Solution
@@ -64,6 +64,7 @@ class MotionFindings:
     track: Track
     causes: List[Cause] = field(default_factory=list)
     apart: List[np.ndarray] = field(default_factory=list)
+    mounts: float = 0.0
 
     @property
     def is_alone(self) -> bool:
@@ -84,10 +85,13 @@ class MotionFindings:
             return self
         # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
         course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
-        gone, told = places - places[0], course if course.is_told else self._direction
-        aside = rotated(gone, np.full(len(gone), told.unexplained)) - gone
-        turned = course_causes(course) or self._calibration_causes()
-        return replace(self, causes=[*self.causes, *turned], apart=[*self.apart, aside, self._late(places)])
+        # Where no course tells which of them is turned, it may be the sonar alone.
+        direction = NOT_TOLD if course.is_told else self._direction
+        turn, mounts = direction if direction.is_told else (course.unexplained, 0.0)
+        gone = places - places[0]
+        aside = rotated(gone, np.full(len(gone), turn)) - gone
+        causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
+        return replace(self, causes=causes, apart=[*self.apart, aside, self._late(places)], mounts=mounts)
 
     def _late(self, places: np.ndarray) -> np.ndarray:
         """Return how far nodes at `places` (n, 2) [m] lie beside where they are by the sonar's clock, (n, 2) m.

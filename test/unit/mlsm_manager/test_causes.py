@@ -1,6 +1,7 @@
 """What is wrong with a recording is found and named, and what a vehicle cannot have done is mended."""
 
 from dataclasses import replace
+from functools import partial
 from time import monotonic
 
 import numpy as np
@@ -9,7 +10,7 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
-from made_recordings import SECONDS, touring
+from made_recordings import SECONDS, strafing, touring
 
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.localisation.following import Following
@@ -30,7 +31,7 @@ from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractor
 pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested with every version")
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
-START = WHOLE.track.times[0]
+START, ASIDE = WHOLE.track.times[0], strafing()
 
 
 def scans_in(recording):
@@ -195,6 +196,9 @@ def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
         (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0."),
         (broken.delayed(WHOLE, 8.0), "beams were sent"),
         (rare.axes_swapped(WHOLE), "the odometry's positions are mirrored"),
+        (rare.positions_swapped(ASIDE), "the odometry's moves are mirrored"),
+        (rare.compass_reversed(WHOLE, False), "the compass counts the other way, beside positions that are right"),
+        (rare.compass_reversed(ASIDE, True), "the compass counts the other way, and positions are reckoned with it"),
         (rare.bottom_lost(WHOLE, MIDDLE, 40.0), "the vehicle was carried by 1"),
     ],
 )
@@ -264,27 +268,30 @@ def test_a_mount_that_is_put_right_has_no_cause_left(fault):
     assert found_in(recording.mounted(mount.turn, mount.is_over)).causes == []
 
 
-SHORT = shortened(WHOLE, 200.0)
+SHORT = {"ahead": shortened(WHOLE, 200.0), "aside": shortened(ASIDE, 200.0)}
 FAULTS = {
-    "direction of motion is turned by ": rare.positions_swapped,
-    "positions are mirrored beside its headings": rare.axes_swapped,
+    "the odometry's direction of motion is turned by ": ("ahead", rare.positions_swapped),
+    "the odometry's positions are mirrored beside its headings": ("ahead", rare.axes_swapped),
+    "the odometry's moves are mirrored beside its headings": ("aside", rare.positions_swapped),
+    "the compass counts the other way, beside ": ("ahead", partial(rare.compass_reversed, positions_follow=False)),
+    "the compass counts the other way, and ": ("aside", partial(rare.compass_reversed, positions_follow=True)),
 }
 
 
 @pytest.fixture(scope="module")
 def mapped():
     """Return what is mapped of recordings whose ranges are 2 % short, as a parameter says, by what is said of them."""
-    reported = rare.sound_faster(SHORT, 1.0 / 1.02)
-    recordings = {"": reported, **{said: fault(reported) for said, fault in FAULTS.items()}}
+    reported = {way: rare.sound_faster(recording, 1.0 / 1.02) for way, recording in SHORT.items()}
+    recordings = {**reported, **{said: fault(reported[way]) for said, (way, fault) in FAULTS.items()}}
     return {said: mapped_as(recording, "--set", "range_scale=1.02") for said, recording in recordings.items()}
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("said", FAULTS)
-def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_fine(mapped, said):
-    found, right = mapped[said], mapped[""]
+def test_an_odometry_whose_axes_are_wrong_is_put_right_and_no_check_is_fine(mapped, said):
+    found, right = mapped[said], mapped[FAULTS[said][0]]
     trust = found.findings.trust
-    assert f"mended: the odometry's {said}" in trust.line
+    assert f"mended: {said}" in trust.line
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
     apart = (found.run.best - right.run.best)[:, :2]
     assert np.hypot(*(apart - apart[0]).T).max() < 1.0
@@ -294,12 +301,12 @@ def test_positions_that_go_aside_or_are_mirrored_are_put_right_and_no_check_is_f
 @pytest.mark.parametrize("said", FAULTS)
 def test_a_recording_that_is_mapped_anew_has_its_ranges_corrected_once(mapped, said):
     beams = mapped[said].recording.beams
-    assert beams[0].beam.range_resolution == pytest.approx(SHORT.beams[0].beam.range_resolution)
+    assert beams[0].beam.range_resolution == pytest.approx(WHOLE.beams[0].beam.range_resolution)
 
 
 @pytest.mark.long
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
-    trust = mapped_as(broken.mount_turned(SHORT, 120.0), "--fix-mount").findings.trust
+    trust = mapped_as(broken.mount_turned(SHORT["ahead"], 120.0), "--fix-mount").findings.trust
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
     assert "mended: the sonar is turned by" in trust.line
 

@@ -142,6 +142,23 @@ def test_no_check_is_fine_of_a_path_that_was_only_assumed():
     assert FIRING.assuming("it was held still") is FIRING
 
 
+@pytest.mark.parametrize(
+    ("if_so", "known"),
+    [(5.0, "position within 8.7 m if so"), (1.0, "position within 1.7 m if so, within 8.7 m if not")],
+)
+def test_of_an_odometry_that_was_put_right_is_said_how_well_the_position_is_known_if_that_is_so(if_so, known):
+    verdicts = [one.assuming("it was turned") for one in (FINE, SHORT)]
+    trust = replace(trust_of(*verdicts), assumed="it was turned", if_so=if_so)
+    assert trust.line == f"trust: NOT MEASURED: it was turned; {known}"
+    assert trust.uncertainty is not None
+
+
+def test_nothing_is_said_of_the_position_by_an_assumption_where_no_check_had_enough_data():
+    trust = replace(trust_of(SHORT.assuming("it was turned")), assumed="it was turned", if_so=1.0)
+    assert trust.line == "trust: NOT MEASURED: it was turned; nothing can be said of the position"
+    assert trust.uncertainty is None
+
+
 def test_stretches_are_doubtful_where_a_check_fires():
     assert trust_of(FINE).doubtful.shape == (0, 2)
     trust = trust_of(FINE, FIRING)
