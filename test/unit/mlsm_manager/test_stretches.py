@@ -9,7 +9,7 @@ from mlsm_manager.localisation import keyframe_traces
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
 from mlsm_manager.localisation.keyframe_traces import Stretches
 from mlsm_manager.scan_matching.scan import MapCloud
-from mlsm_manager.surface_map.point_groups import sorted_by_cell
+from mlsm_manager.surface_map.insertion import _merged_runs
 
 EVERYTHING = 1e9
 
@@ -120,4 +120,4 @@ def test_free_space_moves_too():
 def test_a_map_is_drawn_anew_by_the_loops_that_are_compiled_for_every_map():
     """Loops for single precision, in which stretches are kept, would be compiled for seconds when a loop closes."""
     settled(patch(1)).redraw(Bent(8.0))
-    assert {bottoms.dtype.name for _, bottoms in sorted_by_cell.signatures} == {"float64"}
+    assert {rows.dtype.name for (rows, *_), *_ in _merged_runs.signatures} == {"float64"}
