@@ -34,8 +34,8 @@ def echoes_of(log: RunLog, parameters: SolverParameters, scan: int) -> Echoes:
     nodes = np.zeros((log.scan_count + 1, parameters.odometry.width))
     nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
     solution = Solution(log, parameters, State(nodes, parameters.run_mean(log)))
-    surfaces = solution.placed(log.surfaces.points(log.surfaces.rows(scan, scan + 1)))
-    posts = solution.placed(log.posts.points(log.posts.rows(scan, scan + 1)))
+    surfaces = solution.placed(log.surfaces.heard(scan, scan + 1))
+    posts = solution.placed(log.posts.heard(scan, scan + 1))
     weights = parameters.post_confidence * _POST_WEIGHT * posts.qualities**_POST_POWER
     return Echoes.joined([_made(surfaces, _SURFACE_WEIGHT * surfaces.qualities), _made(posts, weights, True)])
 

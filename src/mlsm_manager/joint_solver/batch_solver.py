@@ -171,7 +171,7 @@ class _Batch:
         self._loops, self._start, self._fixed_steps = list(loops), self.state.copy(), fixed_steps
         self._solution = None
         self._move, self._is_begun = np.zeros(self._layout.size), False
-        self._points = log.surfaces.points(log.surfaces.rows(0, log.scan_count))
+        self._points = log.surfaces.heard(0, log.scan_count)
         self._lists: Optional[Neighbours] = None
         scans, self._posts = np.arange(log.scan_count), None
         if self._parameters.post_confidence:

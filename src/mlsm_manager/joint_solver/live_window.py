@@ -146,7 +146,7 @@ class LiveWindow:
         self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
-        self._recent_points = self._log.surfaces.points(self._log.surfaces.rows(self._recent, last))
+        self._recent_points = self._log.surfaces.heard(self._recent, last)
         self._starts, self._newest_start = self._layout.step_starts, self._layout.node_start(last)
         self._believed_columns = self._layout.with_run(np.array([first]))[0]
         self._motion = self._log.node_motion(np.arange(first, last + 1))

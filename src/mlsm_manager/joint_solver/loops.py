@@ -54,7 +54,7 @@ def loops_of(solution: Solution) -> List[Loop]:
     log, parameters = solution.log, solution.parameters
     if parameters.parts_per_turn > 1:
         return []
-    points = solution.placed(log.surfaces.points(log.surfaces.rows(0, log.scan_count)))
+    points = solution.placed(log.surfaces.heard(0, log.scan_count))
     found = [_loop(points, scan, parameters) for scan in range(APART, log.scan_count)]
     return agreed([loop for loop in found if loop is not None])
 

@@ -272,7 +272,7 @@ def _post_support(solution: Solution, shifts: np.ndarray) -> np.ndarray:
     """Return how many of the newest scan's echoes of posts (k,) lie on earlier ones; see _with_ends_moved."""
     last, posts = solution.log.scan_count, solution.log.posts
     of_scans = (last - 1, last), (max(0, last - 1 - _COMPARED_SCANS), last - 1)
-    sources, targets = (solution.placed(posts.points(posts.rows(*each))) for each in of_scans)
+    sources, targets = (solution.placed(posts.heard(*each)) for each in of_scans)
     if not len(sources) or not len(targets):
         return np.zeros(len(shifts))
     places = _with_ends_moved(sources, shifts)

@@ -47,7 +47,7 @@ class PointTable:
         """Return a table of what `change` makes of `scan` and all later ones, the first of which is number 0 there."""
         later = PointTable()
         for number in range(scan, self.scan_count):
-            later.append(change(self.points(self.rows(number, number + 1))[0]))
+            later.append(change(self.heard(number, number + 1)[0]))
         return later
 
     def shorten(self, scans: int) -> None:
@@ -75,6 +75,10 @@ class PointTable:
         """Return the points in `rows` (n,) int, and the scan (n,) int of each."""
         *columns, scans = self._table.chosen(rows, *_OF_POINTS, "scans")
         return SurfacePoints(*columns), scans.astype(np.int64)
+
+    def heard(self, first: int, last: int) -> Tuple[SurfacePoints, np.ndarray]:
+        """Return the points of scans `first` to `last` - 1, oldest scan first, and the scan (n,) int of each."""
+        return self.points(self.rows(first, last))
 
 
 class RunLog:

@@ -176,7 +176,7 @@ def changed_ranges(run: Solution) -> List[SonarFault]:
     """Return the likeliest changes of the range setting: where all around much more is heard, or less, of the range."""
     log, heard, found = run.log, [], []
     for scan in range(log.scan_count):
-        points, _ = log.surfaces.points(log.surfaces.rows(scan, scan + 1))
+        points, _ = log.surfaces.heard(scan, scan + 1)
         heard.append((points.bearings + log.odometry.at(points.times)[:, YAW], np.log(points.ranges)))
     for scan, begin in enumerate((log.node_times[1:-2] + log.node_times[2:-1]) / 2.0, start=1):
         (bearings, before), (later, after) = heard[scan - 1], heard[scan + 1]

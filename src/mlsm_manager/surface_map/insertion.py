@@ -1,15 +1,34 @@
-"""Insertion of points and of blocks into a store: compiled loops merge them with the blocks that their cells hold."""
+"""Insertion of points and of blocks into a store: compiled loops merge them with the blocks that their cells hold.
+
+A point belongs to a block when it is closer than the resolution to its top or bottom, or between them, and a point that
+belongs to several fuses them (thesis 6.5.6). In one cell that is single linkage in z: the partition that is left at
+the end does not depend on the order in which the points came. So a whole scan is sorted once and split at its gaps.
+"""
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Tuple
+from typing import NamedTuple, Tuple
 
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import NO_BLOCK, BlockStore, Runs
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys
-from mlsm_manager.surface_map.point_groups import VALUES, Groups, finite_within, grouped_points, sorted_by_cell
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys, keys_of
 from node_support.numba_cache import compiled
+
+_VALUES = 4  # mean of x y z and strength, then as many sums of squares: the first columns of a row
+_FINITE = np.finfo(np.float64).max
+
+
+class Groups(NamedTuple):
+    """Intervals of height in cells, sorted by cell, then by bottom.
+
+    rows: (g, ROW_WIDTH) as Blocks has them. cell: (g,) int64 index of the cell. crossed: (g,) uint16 number of beams
+    that crossed it since a point last fell into it.
+    """
+
+    rows: np.ndarray
+    cell: np.ndarray
+    crossed: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -23,19 +42,19 @@ class InsertReport:
 
 def admitted(points: np.ndarray, limit: float) -> Tuple[np.ndarray, InsertReport]:
     """Return which points (n, 4) are finite and have no coordinate beyond `limit` [m], and what became of all."""
-    kept, not_finite = finite_within(np.ascontiguousarray(points, dtype=np.float64), limit)
+    kept, not_finite = _finite_within(np.ascontiguousarray(points, dtype=np.float64), limit)
     return kept, InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
 
 
 def blocks_of(points: np.ndarray, resolution: float, limit: float = np.inf) -> Blocks:
     """Return the blocks that points (n, 4) make in an empty map; `limit`: see `admitted`."""
-    _, groups = grouped_points(admitted(points, limit)[0], resolution)
+    _, groups = _grouped_points(admitted(points, limit)[0], resolution)
     return Blocks(groups.rows, resolution, groups.crossed)
 
 
 def insert_points(store: BlockStore, points: np.ndarray) -> np.ndarray:
     """Insert admitted points (n, 4); return the keys (c,) of the cells that they went into, sorted."""
-    cells, groups = grouped_points(points, store.resolution)
+    cells, groups = _grouped_points(points, store.resolution)
     _insert_groups(store, cells, groups)
     return cells
 
@@ -44,7 +63,7 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
     """Insert blocks of the store's resolution, which may overlap; return the keys (c,) of their cells, sorted."""
     # Single precision would be compiled anew, for seconds, when the first loop closes.
     rows = blocks.rows.astype(np.float64, copy=False)
-    cells, order, starts = sorted_by_cell(cell_keys(blocks.cells), rows[:, BOTTOM])
+    cells, order, starts = _sorted_by_cell(cell_keys(blocks.cells), rows[:, BOTTOM])
     owner = np.repeat(np.arange(len(cells)), np.diff(starts))
     _insert_groups(store, cells, Groups(rows[order], owner, blocks.crossed[order]))
     return cells
@@ -153,15 +172,15 @@ def _pool(parts, block):
     for part in range(1, len(parts)):
         block[COUNT] += parts[part, COUNT]
         block[TOP] = max(block[TOP], parts[part, TOP])
-    for column in range(VALUES):
+    for column in range(_VALUES):
         first, total, squares = parts[0, column], 0.0, 0.0
         for part in range(len(parts)):
             total += (parts[part, column] - first) * parts[part, COUNT]
         mean = first + total / block[COUNT]
         for part in range(len(parts)):
             shift = parts[part, column] - mean
-            squares += parts[part, VALUES + column] + shift * shift * parts[part, COUNT]
-        block[column], block[VALUES + column] = mean, squares
+            squares += parts[part, _VALUES + column] + shift * shift * parts[part, COUNT]
+        block[column], block[_VALUES + column] = mean, squares
 
 
 @compiled()
@@ -175,3 +194,71 @@ def _row_of(rows, fused, gone):
             fused[gone] = row
             gone += 1
     return kept, gone
+
+
+@compiled()
+def _finite_within(points, limit):
+    """Return those of points (n, 4) that are finite and have no coordinate beyond `limit` [m], (m, 4) float64, and how
+    many are not finite.
+    """
+    kept, number, not_finite = np.empty((len(points), 4)), 0, 0
+    for point in range(len(points)):
+        is_inside, is_finite = True, True
+        for column in range(4):
+            value = np.float64(points[point, column])
+            kept[number, column] = value
+            is_finite &= abs(value) <= _FINITE
+            is_inside &= abs(value) <= limit or column == 3
+        not_finite += not is_finite
+        number += is_finite and is_inside
+    return kept[:number], not_finite
+
+
+def _grouped_points(points: np.ndarray, resolution: float) -> Tuple[np.ndarray, Groups]:
+    """Return the keys (c,) of the cells of points (n, 4), sorted, and the Groups that the points make by themselves."""
+    cells, order, starts = _sorted_by_cell(keys_of(points, resolution), points[:, 2])
+    return cells, Groups(*_split_at_gaps(points, order, starts, resolution))
+
+
+def _sorted_by_cell(cell: np.ndarray, height: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return the keys (c,) in `cell` (n,), sorted; the order (n,) that sorts by cell, height (n,) and place in the
+    array; and where each cell begins in that order (c + 1,).
+    """
+    order = np.lexsort((height, cell))
+    keys = cell[order]
+    starts = np.flatnonzero(np.diff(keys, prepend=keys[:1] - 1))
+    return keys[starts], order, np.append(starts, len(keys))
+
+
+@compiled()
+def _split_at_gaps(points, order, starts, resolution):
+    """Return the members of the Groups of points (n, 4) that are sorted by cell; order, starts: see _sorted_by_cell."""
+    rows, owner = np.empty((len(points), ROW_WIDTH)), np.empty(len(points), np.int64)
+    groups = 0
+    for number in range(len(starts) - 1):
+        start = starts[number]
+        for place in range(starts[number] + 1, starts[number + 1] + 1):
+            if place < starts[number + 1] and points[order[place], 2] - points[order[place - 1], 2] < resolution:
+                continue
+            _write_group(points, order, start, place, rows[groups])
+            owner[groups] = number
+            groups += 1
+            start = place
+    return rows[:groups], owner[:groups], np.zeros(groups, np.uint16)
+
+
+@compiled()
+def _write_group(points, order, start, end, row):
+    count = np.float64(end - start)
+    for column in range(_VALUES):
+        # From one of the points on: a plain sum rounds, and the mean of points on a border would leave their cell.
+        first, total, squares = points[order[start], column], 0.0, 0.0
+        for place in range(start, end):
+            total += points[order[place], column] - first
+        mean = first + total / count
+        for place in range(start, end):
+            deviation = points[order[place], column] - mean
+            squares += deviation * deviation
+        row[column], row[_VALUES + column] = mean, squares
+    row[COUNT] = count
+    row[BOTTOM], row[TOP] = points[order[start], 2], points[order[end - 1], 2]

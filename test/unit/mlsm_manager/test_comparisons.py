@@ -114,7 +114,7 @@ def test_comparisons_do_not_tell_how_the_whole_map_is_turned(log, normal_deviati
         solution_of(log, MODELS[0], some_state(log)),
         solver_parameters(),
     )
-    points = solution.placed(log.surfaces.points(log.surfaces.rows(0, 3)))
+    points = solution.placed(log.surfaces.heard(0, 3))
     places = solution.node_places(np.arange(log.scan_count + 1))
     rows = np.arange(len(points))
     pairs = Pairs(rows, rng.permutation(rows), np.ones(len(rows)))
@@ -169,7 +169,7 @@ def test_the_path_goes_on_beyond_the_nodes_as_the_odometry_does(log, odometry):
 
 
 def test_no_points_lie_nowhere(log):
-    nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.surfaces.points(log.surfaces.rows(0, 0)))
+    nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.surfaces.heard(0, 0))
     assert [len(getattr(nothing, field.name)) for field in fields(nothing)] == [0] * len(fields(nothing))
 
 

@@ -31,7 +31,7 @@ def some_state(log):
 
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
-    placed = solution_of(log, DVL, some_state(log)).placed(log.surfaces.points(log.surfaces.rows(0, 3)))
+    placed = solution_of(log, DVL, some_state(log)).placed(log.surfaces.heard(0, 3))
     pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, solver_parameters())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
@@ -182,7 +182,7 @@ def test_qualities_do_not_jump_when_points_move_a_little():
 
 
 def test_normals_point_away_from_the_sonar(log):
-    points, _ = log.surfaces.points(log.surfaces.rows(0, 3))
+    points, _ = log.surfaces.heard(0, 3)
     sight = np.column_stack([np.cos(points.bearings), np.sin(points.bearings)])
     assert isinstance(points, SurfacePoints)
     assert (np.einsum("na,na->n", sight, points.normals) > 0.0).all()

@@ -32,7 +32,7 @@ def log():
 def test_points_of_forgotten_scans_are_gone_and_those_of_others_stay(log):
     whole = logged(SCANS)
     for scan in range(len(SCANS)):
-        (found, scans), (before, _) = (one.surfaces.points(one.surfaces.rows(scan, scan + 1)) for one in (log, whole))
+        (found, scans), (before, _) = (one.surfaces.heard(scan, scan + 1) for one in (log, whole))
         np.testing.assert_array_equal(found.ranges, [] if EVERY_THIRD[scan] else before.ranges)
         assert set(scans) <= {scan}
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_maps import in_order, map_with, partition, random_map
 
-from mlsm_manager.surface_map import block_store, insertion, point_groups
+from mlsm_manager.surface_map import block_store, insertion
 from mlsm_manager.surface_map.blocks import Blocks, cells_of
 from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
@@ -118,7 +118,7 @@ def test_the_points_given_are_not_written_to():
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_no_loop_is_compiled_after_the_map_was_made(dtype, writeable):
     surface_map = MultiLevelSurfaceMap(0.5)
-    loops = [loop for module in (block_store, insertion, point_groups) for loop in vars(module).values()]
+    loops = [loop for module in (block_store, insertion) for loop in vars(module).values()]
     loops = [loop for loop in loops if hasattr(loop, "signatures")]
     compiled = [len(loop.signatures) for loop in loops]
     points = np.zeros((3, 4), dtype)

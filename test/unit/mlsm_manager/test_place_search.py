@@ -97,7 +97,7 @@ def known_places():
 def pairs_with(known):
     solver = LiveSolver(PARAMETERS, RunLog(SONAR))
     solver.add(HARBOUR.scans[0])
-    sources = solver.solution.placed(solver.log.surfaces.points(solver.log.surfaces.rows(0, 1)))
+    sources = solver.solution.placed(solver.log.surfaces.heard(0, 1))
     return known.compared(sources, 2.2, solver_parameters()), sources
 
 

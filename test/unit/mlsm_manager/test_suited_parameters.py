@@ -43,7 +43,7 @@ def test_what_changes_tells_the_odometry(reported, kind):
 def test_a_pose_that_never_changes_is_held_unless_sweeps_show_a_motion():
     standing = odometry_of(Recording([], 0, track(x=3.0, y=1.0, yaw=0.4), None))
     assert (standing.name, standing.motion) == ("not told, held still", SweepMotion.UNTOLD)
-    assert "nothing tells" in standing.assumed
+    assert "nothing tells" in standing.assumed.text
     held, seems_still, drifting, moving = (
         with_odometry(ReplayParameters(), standing.kind, (), motion)
         for motion in (SweepMotion.UNTOLD, SweepMotion.STILL, SweepMotion.DRIFTING, SweepMotion.MOVING)
