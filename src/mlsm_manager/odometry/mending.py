@@ -21,7 +21,7 @@ _FOLLOWS = 0.5  # share of a step of the heading, halfway between a course that 
 _TURNS = 200  # between poses, that show whether a heading is measured
 _MOSTLY, _FEWEST = 0.5, 20  # share of poses that repeat the one before, and others besides, where an odometry repeats
 _SLOW = 0.5  # s: what is repeated for less is as good as told evenly
-_TO_AND_FRO = 0.1  # share of neighbouring turns of a measured heading that have opposite signs
+_TO_AND_FRO = 0.03  # share of neighbouring turns of a measured heading that have opposite signs
 
 
 class Mended(NamedTuple):
@@ -60,18 +60,23 @@ def standing_stretches(track: Track, first_column: int = 0) -> Iterator[Tuple[in
 
 
 def stuck_headings(track: Track) -> List[Tuple[float, float]]:
-    """Return when [s] the heading stood while positions went on, if it trembles elsewhere as measured ones do."""
-    standing, stuck = list(standing_stretches(track, _YAW)), np.zeros(len(track.times) - 1, dtype=bool)
-    for first, last in standing:
-        stuck[first:last] = True
-    turns = np.sign(np.diff(track.poses[:, _YAW]))[~stuck]
-    if len(turns) < _TURNS or np.mean(turns[1:] * turns[:-1] < 0.0) < _TO_AND_FRO:
+    """Return when [s] the heading stood while positions went on, if it is measured elsewhere."""
+    if not is_heading_measured(track):
         return []
     return [
         (float(track.times[first]), float(track.times[last]))
-        for first, last in standing
+        for first, last in standing_stretches(track, _YAW)
         if np.hypot(*np.ptp(track.poses[first : last + 1, :2], axis=0)) > _GOES
     ]
+
+
+def is_heading_measured(track: Track) -> bool:
+    """Return whether the heading trembles as a measured one does, but for where it does not change at all."""
+    stands = np.zeros(len(track.times) - 1, dtype=bool)
+    for first, last in standing_stretches(track, _YAW):
+        stands[first:last] = True
+    turns = np.sign(np.diff(track.poses[:, _YAW]))[~stands]
+    return len(turns) >= _TURNS and bool(np.mean(turns[1:] * turns[:-1] < 0.0) >= _TO_AND_FRO)
 
 
 def _without_repeats(track: Track) -> Tuple[Track, List[Step]]:

@@ -54,10 +54,8 @@ class StepKind(Enum):
     POSITIONS = "positions stood while the heading went on, and missed {size:.1f} m"
 
 
-_LONGEST_STALLS = {StepKind.STALLED: 10.0, StepKind.POSITIONS: 30.0}
-"""s. Poses that are equal for longer may be those of a vehicle that stands; and a vehicle whose positions are equal for
-longer, while its heading is measured, may have done anything.
-"""
+_LONGEST_STALL = 30.0  # s: a vehicle may have done anything meanwhile
+_MAY_STAND = 10.0  # s: poses that are equal for longer may be those of a vehicle that stands, if it came to a stop
 
 
 @dataclass(frozen=True)
@@ -207,7 +205,7 @@ def _oldest_that_tells(track: Track) -> int:
     """Return from which pose on a track tells whether its end is a stall, and how the vehicle went just before."""
     stands = np.flatnonzero(_moves(track))[-1:] + 1
     begin = track.times[stands[0]] if stands.size else track.times[0]
-    longest = track.times[-1] - max(_LONGEST_STALLS.values())
+    longest = track.times[-1] - _LONGEST_STALL
     return int(np.searchsorted(track.times, max(begin, longest) - _BEFORE))
 
 
@@ -242,7 +240,7 @@ def _moves(track: Track) -> np.ndarray:
 def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
     times, poses, start = track.times, track.poses, int(np.searchsorted(track.times, track.times[first] - _BEFORE))
     kind = StepKind.POSITIONS if np.ptp(poses[first : last + 1, 2]) else StepKind.STALLED
-    if not _SHORTEST_STALL <= times[last] - times[first] < _LONGEST_STALLS[kind] or first - start < 2:
+    if not _SHORTEST_STALL <= times[last] - times[first] < _LONGEST_STALL or first - start < 2:
         return None
     steps, step = seen_from(poses[start:first], poses[start + 1 : first + 1]), times[last + 1] - times[last]
     rates = steps / np.diff(times[start : first + 1])[:, np.newaxis]
@@ -253,7 +251,8 @@ def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
         goes = stops[0] or _speeds(again)[0] > _GOES[0]
     else:
         missed = usual * (times[last + 1] - times[first])
-        goes = (stops & (_speeds(again) > _AS_BEFORE * _speeds(usual))).any() or _trembles(steps[:, 2])
+        at_once, trembles = (stops & (_speeds(again) > _AS_BEFORE * _speeds(usual))).any(), _trembles(steps[:, 2])
+        goes = at_once or trembles if times[last] - times[first] < _MAY_STAND else at_once and trembles
     return Stall(first, last + 1, missed, usual * step, kind) if goes else None
 
 

@@ -4,7 +4,7 @@ from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.odometry.mending import standing_stretches, stuck_headings
+from mlsm_manager.odometry.mending import is_heading_measured, standing_stretches, stuck_headings
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, of_stuck
 from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs
@@ -13,6 +13,7 @@ _FEWEST_PAIRS = 3
 _CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose itself says that nobody measured it
 _STRAIGHT = 2  # stretches of one heading, without positions: more are straight ways by a compass without noise
 _FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
+_AT_ONE_PLACE = 0.4  # times as far: simulated vehicles that stopped had .06 to .25, one that went along a wall .57
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle
 
 
@@ -36,18 +37,31 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
     inside = [(times[:, 0] >= begin) & (times[:, 1] <= end) for begin, end in stretches]
     # What such a stretch moved unseen lies between the two scans of a pair that reaches into it.
     outside = [(times[:, 1] <= begin) | (times[:, 0] >= end) for begin, end in stretches]
-    elsewhere = apart[np.all(outside, axis=0)]
+    elsewhere, seems = apart[np.all(outside, axis=0)], _seems_frozen if is_heading_measured(track) else _moves
     return [
         _cause(begin, end, apart[within], elsewhere)
         for (begin, end), within in zip(stretches, inside)
-        if _moves(apart[within], elsewhere)
+        if seems(apart[within], elsewhere)
     ]
 
 
 def _moves(within: np.ndarray, elsewhere: np.ndarray) -> bool:
-    if min(len(within), len(elsewhere)) < _FEWEST_PAIRS:
+    """Return whether scans lie farther apart than elsewhere, where they are known to be of other places."""
+    return _lie_apart(within, elsewhere, _FEWEST_PAIRS, _FARTHER)
+
+
+def _seems_frozen(within: np.ndarray, elsewhere: np.ndarray) -> bool:
+    """Return whether a pose that elsewhere trembles stands though scans do not show that the vehicle does.
+
+    Along a straight wall they lie on each other wherever the vehicle goes.
+    """
+    return _lie_apart(within, elsewhere, 1, _AT_ONE_PLACE)
+
+
+def _lie_apart(within: np.ndarray, elsewhere: np.ndarray, fewest: int, share: float) -> bool:
+    if len(within) < fewest or len(elsewhere) < _FEWEST_PAIRS:
         return False
-    return float(np.median(within)) > _FARTHER * float(np.median(elsewhere))
+    return float(np.median(within)) > share * float(np.median(elsewhere))
 
 
 def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) -> Cause:

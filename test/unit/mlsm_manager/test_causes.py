@@ -32,6 +32,7 @@ pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START, ASIDE = WHOLE.track.times[0], strafing()
+_TREMBLING = 0.01 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))  # rad, as a measured heading does
 
 
 def scans_in(recording):
@@ -71,6 +72,13 @@ def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
     assert causes[0].begin == pytest.approx(START + MIDDLE + 5.0, abs=0.3)
     apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
     assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+
+
+@pytest.mark.parametrize("measured", [True, False])
+def test_a_vehicle_whose_measured_odometry_freezes_at_once_for_longer_goes_on_as_well(measured):
+    recording = broken.with_compass_error(WHOLE, _TREMBLING) if measured else WHOLE
+    _, causes = with_odometry_mended(broken.odometry_freezes(recording, MIDDLE, 20.0), LIMITS)
+    assert [cause.text[:29] for cause in causes] == ["odometry stalled, and missed "] * measured
 
 
 @pytest.mark.parametrize("seconds", [3.0, 20.0])
@@ -158,16 +166,14 @@ def test_what_goes_along_with_the_vehicle_is_left_out():
 
 @pytest.mark.parametrize("measured", [True, False])
 def test_a_heading_that_stands_is_stuck_where_headings_are_measured(measured):
-    noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
-    recording = broken.with_compass_error(WHOLE, noise) if measured else WHOLE
+    recording = broken.with_compass_error(WHOLE, _TREMBLING) if measured else WHOLE
     _, causes = with_odometry_mended(rare.compass_sticks(recording, MIDDLE), LIMITS)
     assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * measured
 
 
 @pytest.mark.parametrize("moves", [True, False])
 def test_a_compass_alone_is_stuck_where_its_heading_stands_and_the_vehicle_goes_on(moves):
-    noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
-    frozen = broken.odometry_freezes(broken.with_compass_error(WHOLE.without_positions(), noise), MIDDLE, 40.0)
+    frozen = broken.odometry_freezes(broken.with_compass_error(WHOLE.without_positions(), _TREMBLING), MIDDLE, 40.0)
     causes = standing_causes([], frozen.track, moves * WHOLE.track.poses)
     assert [cause.text for cause in causes] == ["the compass stuck for 40 s"] * moves
 
@@ -239,6 +245,16 @@ def test_a_head_whose_angles_do_not_tremble_is_left_as_it_is():
     assert with_steady_head(WHOLE) == (WHOLE, [])
 
 
+def _of_walls(places, track):
+    """Return a scan of 10 s of a wall at x = each of `places` [m]."""
+    scans = []
+    for number, place in enumerate(places):
+        heard = 10.0 * number + np.linspace(0.0, 10.0, 50)
+        points = np.column_stack([np.full(50, place), np.linspace(0.0, 0.1, 50), np.zeros(50), np.ones(50)])
+        scans.append(Scan(points, heard, np.zeros(50, dtype=bool), track, heard[-1]))
+    return scans
+
+
 def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehicle_stands():
     frozen = broken.odometry_freezes(WHOLE, MIDDLE, 60.0)
     (cause,) = standing_causes(scans_in(frozen), frozen.track, WHOLE.track.poses)
@@ -248,15 +264,23 @@ def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehi
     assert standing_causes(still, stands, stands.poses) == []
 
 
+@pytest.mark.parametrize(("measured", "step", "named"), [(True, 0.7, True), (False, 0.7, False), (True, 0.1, False)])
+def test_a_measured_pose_that_stands_is_named_frozen_unless_scans_show_that_the_vehicle_stands(measured, step, named):
+    """Four scans a metre apart while the odometry goes, six `step` [m] apart while it stands, as along a wall."""
+    times = np.arange(0.0, 101.0, 0.1)
+    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * (times < 40.0) * measured
+    poses = np.column_stack([0.1 * np.minimum(times, 40.0), np.zeros(len(times)), noise])
+    found = standing_causes(
+        _of_walls([0.0, 1.0, 0.0, 1.0] + [5.0, 5.0 + step] * 3, Track(times, poses)), Track(times, poses), poses
+    )
+    assert [cause.begin for cause in found] == [40.0] * named
+
+
 def test_pairs_of_scans_that_reach_into_a_frozen_stretch_do_not_tell_how_far_apart_scans_usually_lie():
     """Four scans a metre apart while the odometry goes, six 1.5 m apart while it stands, and 4 m and more between."""
     times = np.arange(0.0, 101.0)
     track = Track(times, np.minimum(times, 40.0)[:, np.newaxis] * [0.1, 0.0, 0.0])
-    scans = []
-    for number, place in enumerate([0.0, 1.0, 0.0, 1.0, 5.0, 6.5, 5.0, 6.5, 5.0, 6.5]):
-        heard = 10.0 * number + np.linspace(0.0, 10.0, 50)
-        points = np.column_stack([np.full(50, place), np.linspace(0.0, 0.1, 50), np.zeros(50), np.ones(50)])
-        scans.append(Scan(points, heard, np.zeros(50, dtype=bool), track, heard[-1]))
+    scans = _of_walls([0.0, 1.0, 0.0, 1.0, 5.0, 6.5, 5.0, 6.5, 5.0, 6.5], track)
     (cause,) = standing_causes(scans, track, track.poses)
     assert cause.text.startswith("odometry frozen for 60 s while the echoes move")
 
