@@ -167,10 +167,13 @@ class AdaptedPrior:
 
 
 def _term_between(known: Gaussian, wanted: Gaussian) -> PriorTerm:
-    """Return the factor that makes `wanted` of `known`; where that knows less, as between two peaks, none."""
+    """Return the factor that makes `wanted` of `known`; along axes where that knows less, as between two peaks, none.
+
+    Where all components know the same of an unknown, rounding alone says whether anything is known less: either must
+    come to the same.
+    """
     before, after = np.linalg.inv(known.covariance), np.linalg.inv(wanted.covariance)
     added, axes = np.linalg.eigh(after - before)
-    if added[0] >= 0.0:
-        return PriorTerm(after - before, after @ wanted.mean - before @ known.mean)
-    information = axes @ np.diag(np.maximum(added, 0.0)) @ axes.T
-    return PriorTerm(information, information @ wanted.mean)
+    added, axes = added[added > 0.0], axes[:, added > 0.0]
+    vector = axes @ (axes.T @ (after @ wanted.mean - before @ known.mean))
+    return PriorTerm((axes * added) @ axes.T, vector)

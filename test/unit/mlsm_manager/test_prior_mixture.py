@@ -45,6 +45,17 @@ def test_with_the_term_the_unknown_has_mean_and_variance_of_the_mixture(mean, de
     np.testing.assert_allclose(found, integrated(mean, deviation), rtol=1e-3, atol=1e-6)
 
 
+@pytest.mark.parametrize("seed", range(8))
+def test_of_an_unknown_of_which_all_components_know_the_same_rounding_decides_nothing(seed):
+    widest, rng = np.array([0.1, WIDE]), np.random.RandomState(seed)
+    components = [PriorComponent(one.name, one.share, np.append(0.1, one.deviations)) for one in MIXTURE.components]
+    mixture = PriorMixture((0, 1), np.zeros(2), widest, widest, np.zeros(2), components, MIXTURE.rival)
+    spread = rng.normal(size=(2, 2)) * 0.03
+    covariance, mean = spread @ spread.T + 1e-4 * np.eye(2), 0.02 * rng.normal(size=2)
+    terms = [mixture.judged(Gaussian(mean, covariance * (1.0 + 1e-14 * each))).term for each in range(10)]
+    np.testing.assert_allclose([term.vector for term in terms], np.tile(terms[0].vector, (10, 1)), rtol=1e-6, atol=1e-6)
+
+
 @pytest.mark.parametrize(("mean", "likeliest"), [(0.0, "still"), (0.02, "still"), (0.3, "flowing"), (-0.2, "flowing")])
 def test_the_echoes_tell_the_component(mean, likeliest):
     assert MIXTURE.likeliest(known(mean, 0.03)).name == likeliest
