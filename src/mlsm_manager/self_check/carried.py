@@ -28,11 +28,11 @@ class _Stretch(NamedTuple):
     nats: float
 
 
-def carried(pairs: ScanPairs) -> List[Cause]:
-    """Return when and how fast the vehicle was likeliest carried, if it may have been, however little speaks for it."""
+def carried(pairs: ScanPairs, least: float) -> List[Cause]:
+    """Return when and how fast the vehicle was carried, if that has more evidence than `least` [nats]."""
     near = pairs.near()
     found = _likeliest(pairs, near)
-    if found is None or float(np.hypot(*found.velocity)) < _FINER[0]:
+    if found is None or found.nats < least:
         return []
     begin, end = near.middles[[found.first, found.last]]
     velocity = pairs.in_odometry(_refined(pairs, near, found), begin)

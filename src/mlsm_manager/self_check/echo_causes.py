@@ -30,7 +30,7 @@ TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 class EchoFindings(NamedTuple):
     """causes: that are named. mount: the likeliest mount, where one is named; else that of tf.
 
-    suspected: faults that pairs of scans alone do not tell, and a fit of the run may.
+    suspected: faults that pairs of scans alone do not tell, beside a compass alone.
     """
 
     causes: List[Cause]
@@ -57,9 +57,8 @@ def echo_findings(
     if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
-    likely = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs)]
-    named = ranked(cause for cause in likely if cause.evidence > NAMED_FROM)
-    return EchoFindings(named, AS_TOLD, [cause.fault for cause in likely if cause not in named])
+    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, NAMED_FROM)]
+    return EchoFindings(ranked(found), AS_TOLD)
 
 
 def _reports_positions(scans: Sequence[Scan]) -> bool:

@@ -188,9 +188,7 @@ def motion_findings(
         if best.gain < _needed(found, best.fault) or not best.fault.is_beyond(errors.times[-1]):
             break
         found = _without(found, best)
-        # A current explains what is left of any other fault: pairs of scans tell one if nothing else is wrong.
-        others = [fault for fault in suspected if fault.kind is not FaultKind.CARRIED]
-        suspected = [fault for fault in others if not is_same(fault, best.fault)]
+        suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
     others = [places, first] if found.causes else [places] if _errs(errors) else []
     return replace(found, apart=[other - _places(found.run) for other in others])
 
@@ -198,12 +196,11 @@ def motion_findings(
 def _needed(found: MotionFindings, fault: Fault) -> float:
     """Return by how many nats a run must be likelier without a fault for that to be named.
 
-    Distances may change, and currents begin, at any moment: where half of the circle was heard, a wrong change gained
-    6.4.
+    Distances may change at any moment: where half of the circle was heard, a wrong change gained 6.4.
     """
     if found.is_alone and fault.kind in _SUDDEN:
         return _NATS_ALONE
-    return NAMED_FROM if fault.kind in (FaultKind.DISTANCES, FaultKind.CARRIED) else _NATS
+    return NAMED_FROM if fault.kind is FaultKind.DISTANCES else _NATS
 
 
 def _tells(track: Track) -> bool:

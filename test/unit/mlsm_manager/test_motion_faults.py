@@ -111,15 +111,6 @@ def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed()
     assert off(found).mean() < 1.0  # m
 
 
-@pytest.mark.parametrize("speed", [0.0, 0.15])
-def test_a_current_is_suspected_where_pairs_of_scans_show_one_too_weakly_to_name_it(speed):
-    moved = rare.bottom_lost(WHOLE, MIDDLE, 20.0, speed)
-    scans = [scan for scan, _ in scans_of(moved, EchoExtractor(EchoExtractorParameters()))]
-    found = echo_findings(scans, moved.sonar_in_base)
-    assert found.causes == []
-    assert [fault.kind for fault in found.suspected] == [FaultKind.CARRIED] * bool(speed)
-
-
 @pytest.mark.parametrize("degrees", [0.0, 25.0])
 def test_a_slip_of_the_head_is_suspected_beside_a_compass_alone_where_scans_lie_turned_as_the_vehicle_went(degrees):
     alone = broken.head_slips(WHOLE.without_positions(), MIDDLE, degrees)
