@@ -12,6 +12,7 @@ from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Caus
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
+_LENGTHS = 2.0 ** np.arange(-2.0, 1.1, 0.25)  # true over reported: where these are feet, mirrored moves fit better, too
 _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
 _DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
@@ -52,7 +53,8 @@ def echo_findings(
         return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
     honest, best, tried = pairs.honest, *_turned(pairs)
     # The more causes are tried the likelier one fits by chance.
-    nats = pairs.evidence(best, honest) - np.log(tried)
+    of_length = pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)])
+    nats = pairs.evidence(best, of_length) - np.log(tried)
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
     if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
-from benchmarks.faults import shortened
+from benchmarks.faults import shortened, source
 from benchmarks.harness import mapped_as
 from made_recordings import touring
 
@@ -165,6 +165,12 @@ def test_positions_that_go_elsewhere_are_left_out():
 @pytest.mark.long
 def test_nothing_is_named_where_nothing_is_wrong():
     assert mapped_as(WHOLE, "--refine").findings.trust.causes == []
+
+
+@pytest.mark.long
+def test_distances_in_feet_do_not_make_the_moves_of_a_vehicle_that_strafes_look_mirrored():
+    in_feet = broken.odometry_scaled(source("turning", 600.0), 3.28)
+    assert mapped_as(in_feet, "--refine").findings.trust.causes == []
 
 
 @pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1), (90.0, 1), (-179.0, 1)])
