@@ -67,7 +67,7 @@ def _lie_apart(within: np.ndarray, elsewhere: np.ndarray, fewest: int, share: fl
 def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) -> Cause:
     noise = max(float(elsewhere.std()) / np.sqrt(len(within)), 1e-2)
     nats = 0.5 * (float(within.mean() - elsewhere.mean()) / noise) ** 2
-    text = f"odometry frozen for {end - begin:.0f} s while the echoes move,"
+    text = f"odometry frozen for {end - begin:.0f} s{' while the echoes move' if _moves(within, elsewhere) else ''},"
     return Cause(text, _CERTAIN + nats, begin, metres=_SPEED * (end - begin))
 
 
