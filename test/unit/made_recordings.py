@@ -33,6 +33,11 @@ def strafing() -> Recording:
     return _along(lambda angle: (12.0 * np.cos(angle) - 2.0, 8.0 * np.sin(angle)), lambda angle: 1.5 * np.sin(angle))
 
 
+def trembling(recording: Recording) -> np.ndarray:
+    """Return noise [rad] of each heading of a recording, as of one that is measured."""
+    return 0.01 * np.random.RandomState(1).normal(size=len(recording.track.times))
+
+
 def _along(
     way: Callable[[np.ndarray], Tuple[np.ndarray, np.ndarray]],
     aside: Callable[[np.ndarray], np.ndarray] = np.zeros_like,

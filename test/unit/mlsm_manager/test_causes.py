@@ -1,4 +1,4 @@
-"""What is wrong with a recording is found and named, and what a vehicle cannot have done is mended."""
+"""What is wrong with a recording is found and named, and makes what comes after it uncertain."""
 
 from dataclasses import replace
 from functools import partial
@@ -10,13 +10,12 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
-from made_recordings import SECONDS, strafing, touring
+from made_recordings import SECONDS, strafing, touring, trembling
 
-from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
-from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
-from mlsm_manager.offline.bag_mapping import with_odometry_mended, with_steady_head
+from mlsm_manager.odometry.steps import MotionLimits
+from mlsm_manager.offline.bag_mapping import with_steady_head
 from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes
@@ -32,7 +31,6 @@ pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START, ASIDE = WHOLE.track.times[0], strafing()
-_TREMBLING = 0.01 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))  # rad, as a measured heading does
 
 
 def scans_in(recording):
@@ -41,109 +39,6 @@ def scans_in(recording):
 
 def found_in(recording):
     return echo_findings(scans_in(recording), recording.sonar_in_base)
-
-
-@pytest.mark.parametrize(
-    ("recording", "said"),
-    [
-        (broken.odometry_jumps(WHOLE, MIDDLE, 30.0), "odometry jumped by 30"),
-        (broken.odometry_jumps(WHOLE, MIDDLE, 5.0), "odometry jumped by "),
-        (broken.odometry_restarts(WHOLE, MIDDLE), "odometry started again from zero"),
-        (broken.odometry_glitches(WHOLE, MIDDLE, 50.0), "odometry jumped by 50"),
-        (broken.compass_steps(WHOLE, MIDDLE, 20.0), "compass stepped by 20 deg"),
-        (broken.compass_steps(WHOLE, MIDDLE, -8.0), "compass stepped by -8 deg"),
-        (broken.compass_steps(WHOLE, MIDDLE, 20.0, positions_follow=False), "compass stepped by 20 deg"),
-        (broken.odometry_freezes(WHOLE, MIDDLE, 20.0, goes_on=False), "odometry held for 20 s, and then right again"),
-    ],
-)
-def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
-    mended, causes = with_odometry_mended(recording, LIMITS)
-    assert causes[0].text.startswith(said)
-    assert causes[0].is_mended
-    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
-    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
-    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
-
-
-@pytest.mark.parametrize("goes_on", [True, False])
-def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
-    mended, causes = with_odometry_mended(broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on), LIMITS)
-    assert causes[0].text.startswith("odometry stalled, and missed 1.")
-    assert causes[0].begin == pytest.approx(START + MIDDLE + 5.0, abs=0.3)
-    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
-    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
-
-
-@pytest.mark.parametrize("measured", [True, False])
-def test_a_vehicle_whose_measured_odometry_freezes_at_once_for_longer_goes_on_as_well(measured):
-    recording = broken.with_compass_error(WHOLE, _TREMBLING) if measured else WHOLE
-    _, causes = with_odometry_mended(broken.odometry_freezes(recording, MIDDLE, 20.0), LIMITS)
-    assert [cause.text[:29] for cause in causes] == ["odometry stalled, and missed "] * measured
-
-
-@pytest.mark.parametrize("seconds", [3.0, 20.0])
-def test_a_vehicle_goes_on_by_its_compass_while_positions_stand(seconds):
-    standing = rare.velocities_missing(WHOLE, seconds, every=MIDDLE)
-    mended, causes = with_odometry_mended(standing, LIMITS)
-    assert causes[0].text.startswith("positions stood while the heading went on, and missed ")
-    assert causes[0].begin == pytest.approx(START + MIDDLE + seconds, abs=0.3)
-    stood = START + MIDDLE + np.array([-0.1, seconds + 0.1])
-    went, mended_way = (np.diff(track.at(stood)[:, :2], axis=0)[0] for track in (WHOLE.track, mended.track))
-    assert np.hypot(*(mended_way - went)) < 0.3 * np.hypot(*went)
-
-
-def test_nobody_knows_how_far_a_vehicle_went_whose_positions_stood():
-    mended, _ = with_odometry_mended(rare.velocities_missing(WHOLE, 5.0, every=MIDDLE), LIMITS)
-    before, after = OdometryLog.of(mended.track).motion(START + MIDDLE + np.array([-1.0, 40.0])).held
-    assert after - before == pytest.approx(5.0, abs=0.3)
-
-
-@pytest.mark.parametrize(("recording", "times"), [(WHOLE, 9), (WHOLE.without_positions(), 5)])
-def test_an_odometry_that_keeps_stalling_leaves_the_run_doubtful(recording, times):
-    """On straight ways a heading tells no stall."""
-    _, causes = with_odometry_mended(rare.odometry_stalls(recording, 5.0, every=30.0), LIMITS)
-    assert [cause.is_mended for cause in causes] == [False]
-    assert causes[0].text.startswith("odometry stalled")
-    assert causes[0].text.endswith(f"{times} times, first")
-
-
-def test_a_vehicle_that_stops_for_a_while_does_not_stall():
-    seconds = WHOLE.track.times - START
-    goes = 1.0 - np.clip(np.minimum(seconds - MIDDLE, MIDDLE + 11.0 - seconds) / 2.0, 0.0, 1.0)
-    steps = broken.steps_of(WHOLE.track.poses) * goes[1:, np.newaxis]
-    poses = broken.integrated(WHOLE.track.poses[0], steps)
-    assert with_odometry_mended(WHOLE.with_track(Track(WHOLE.track.times, poses)), LIMITS)[1] == []
-
-
-def test_many_steps_are_one_cause():
-    _, causes = with_odometry_mended(broken.odometry_jumps(WHOLE, 30.0, 1.0, every=30.0), LIMITS)
-    assert len(causes) == 1
-    assert causes[0].text.endswith("9 times, first")
-
-
-@pytest.mark.parametrize("begin", [0.0, MIDDLE])
-def test_headings_that_tremble_are_smoothed(begin):
-    noise = 5.0 * np.random.RandomState(1).normal(size=len(WHOLE.track.times)) * broken.after(WHOLE, begin)
-    mended, causes = with_odometry_mended(broken.with_compass_error(WHOLE, np.radians(noise), False), LIMITS)
-    assert [cause.text for cause in causes] == ["the compass trembles by about 5 deg"]
-    assert causes[0].begin == pytest.approx(START + begin, abs=10.0)
-    assert causes[0].is_mended
-    assert np.degrees(np.std(mended.track.poses[:, 2] - WHOLE.track.poses[:, 2])) < 2.0
-
-
-def test_poses_that_are_told_again_and_again_are_left_out():
-    times = WHOLE.track.times
-    told = Track(times, WHOLE.track.at(times[0] + 2.0 * np.floor((times - times[0]) / 2.0)))
-    mended, causes = with_odometry_mended(WHOLE.with_track(told), LIMITS)
-    assert [cause.text for cause in causes] == ["the odometry repeats each pose for about 2.0 s"]
-    assert np.abs(mended.track.at(times) - WHOLE.track.poses)[:-20].max() < 0.3
-
-
-def test_positions_that_tremble_are_smoothed():
-    mended, causes = with_odometry_mended(rare.odometry_noisy(WHOLE, 0.5), LIMITS)
-    assert [cause.text for cause in causes] == ["reported positions tremble by about 0.5 m"]
-    assert causes[0].is_mended
-    assert np.std(mended.track.poses[:, :2] - WHOLE.track.poses[:, :2]) < 0.2
 
 
 def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on():
@@ -164,32 +59,13 @@ def test_what_goes_along_with_the_vehicle_is_left_out():
     assert without_companions(WHOLE.beams, WHOLE.track) == (WHOLE.beams, [])
 
 
-@pytest.mark.parametrize("measured", [True, False])
-def test_a_heading_that_stands_is_stuck_where_headings_are_measured(measured):
-    recording = broken.with_compass_error(WHOLE, _TREMBLING) if measured else WHOLE
-    _, causes = with_odometry_mended(rare.compass_sticks(recording, MIDDLE), LIMITS)
-    assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * measured
-
-
 @pytest.mark.parametrize("moves", [True, False])
 def test_a_compass_alone_is_stuck_where_its_heading_stands_and_the_vehicle_goes_on(moves):
-    frozen = broken.odometry_freezes(broken.with_compass_error(WHOLE.without_positions(), _TREMBLING), MIDDLE, 40.0)
+    frozen = broken.odometry_freezes(
+        broken.with_compass_error(WHOLE.without_positions(), trembling(WHOLE)), MIDDLE, 40.0
+    )
     causes = standing_causes([], frozen.track, moves * WHOLE.track.poses)
     assert [cause.text for cause in causes] == ["the compass stuck for 40 s"] * moves
-
-
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_an_odometry_without_steps_stays_as_it_is(noise):
-    poses = WHOLE.track.poses + noise * np.random.RandomState(0).normal(size=WHOLE.track.poses.shape)
-    recording = WHOLE.with_track(Track(WHOLE.track.times, poses))
-    mended, causes = with_odometry_mended(recording, LIMITS)
-    assert mended is recording
-    assert causes == []
-
-
-def test_a_gap_in_which_the_vehicle_went_on_is_no_step():
-    recording = broken.odometry_missing(WHOLE, MIDDLE, 60.0)
-    assert not len(impossible_steps(recording.track, LIMITS))
 
 
 @pytest.mark.parametrize(
