@@ -30,6 +30,9 @@ FEWEST_BEAMS = 6  # Fewer directions tell no quantile over them
 _SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it is sampled
 _SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do not count as spread
 _SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included
+_DULL = 0.1  # Share of the background in loud directions: the hull hides those with less
+_BACKGROUND = 0.75  # Quantile along a beam: a wall at a quarter of the range may hide what is behind it
+_LOUD = 0.9  # Quantile over the directions that is loud: the hull hides less than nine tenths of a circle
 _ROWS_MEASURED = 8  # Rows of a cloud that tell the length of a bin; it is the same in all of them
 _ROUNDING = 1e-3  # Bins: the length of a bin is known from float32 points, which move by this with the mount
 _NARROW = np.pi / 2.0  # rad: in a narrower sector a wall ahead is heard at one range in most directions, as a ring is
@@ -138,18 +141,27 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
     """Return strength and spread (bins,) of what is heard at each range in most directions.
 
     The strength is the `quantile` over the directions, the spread the distance to the quantile `_SPREAD` higher,
-    averaged over some `sigma` bins: about a quarter of a standard deviation of normal speckle. A quantile of 0 means
-    that there is no ring. Raises RefusedInput for fewer than `FEWEST_BEAMS` beams where there is one.
+    averaged over some `sigma` bins: about a quarter of a standard deviation of normal speckle. Directions without the
+    background of the others, as those behind the hull, do not count. A quantile of 0 means that there is no ring.
+    Raises RefusedInput for fewer than `FEWEST_BEAMS` beams where there is one.
     """
     beams, bins = smooth.shape
     if quantile == 0.0:
         return np.zeros(bins, np.float32), np.zeros(bins, np.float32)
     if beams < FEWEST_BEAMS:
         raise RefusedInput("scans of too few beams", f"{beams}, must be at least {FEWEST_BEAMS} to see a ring")
-    ranks = [int(share * (beams - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
-    ordered = np.partition(smooth, ranks, axis=0)
+    hearing = _hearing(smooth)
+    ranks = [int(share * (len(hearing) - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
+    ordered = np.partition(hearing, ranks, axis=0)
     ring, upper = ordered[ranks[0]], ordered[ranks[1]]
     return ring, uniform_filter1d(upper - ring, 2 * _bins_above(_SPREAD_SIGMAS * sigma) + 1)
+
+
+def _hearing(smooth: np.ndarray) -> np.ndarray:
+    """Return the beams (k, bins) that hear a background; all of them in a scan without one, or where too few do."""
+    background = np.quantile(smooth, _BACKGROUND, axis=1)
+    hearing = background >= _DULL * np.quantile(background, _LOUD)
+    return smooth[hearing] if np.count_nonzero(hearing) >= FEWEST_BEAMS else smooth
 
 
 def _bins_above(width: float) -> int:

@@ -87,6 +87,15 @@ def test_the_ring_of_the_floor_is_no_echo():
     assert np.abs(echoes.bins - WALL[echoes.beams]).max() < 2.0
 
 
+@pytest.mark.parametrize("share", [0.0, 0.05])
+def test_the_ring_of_the_floor_is_no_echo_where_the_hull_hides_half_of_the_circle(share):
+    image = with_speckle(with_ring(wall_image(WALL), at=80), seed=2)
+    image[BEAMS // 2 :] *= share
+    echoes = _echoes(image, **STRONG_ONLY)
+    assert set(echoes.beams) == set(range(BEAMS // 2))
+    assert np.abs(echoes.bins - WALL[echoes.beams]).max() < 2.0
+
+
 def test_without_taking_the_ring_off_it_is_found_in_every_direction():
     echoes = _echoes(with_ring(wall_image(WALL), at=80), ring_quantile=0.0)
     assert set(echoes.beams[np.abs(echoes.bins - 95.0) < 15.0]) == set(range(BEAMS))
