@@ -120,7 +120,8 @@ def _rostest(test: Path) -> Step:
     command = ["rostest", "--results-filename=result.xml", str(test)]
     load = Load.WHOLE if test.stem in MEASURING else Load.SHARED
     # Nodes of one name that run at once would save their maps in one file.
-    variables = {"ROS_HOME": str(RESULTS / test.stem / "ros_home")}
+    # roslaunch asks for distutils; setuptools, which would lend its own, takes as long to import as all of roslaunch.
+    variables = {"ROS_HOME": str(RESULTS / test.stem / "ros_home"), "SETUPTOOLS_USE_DISTUTILS": "stdlib"}
     return Step(f"rostest {test.stem}", command, RESULTS / test.stem, load, variables=variables)
 
 

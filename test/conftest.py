@@ -3,6 +3,9 @@ import shutil
 import sys
 from pathlib import Path
 
+# As the programs do, before anything loads numpy: the matrices are small, and threads would wait for each other.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import pytest
 
 ROOT = Path(__file__).resolve().parents[1]

@@ -57,6 +57,17 @@ class Site:
             self.nodes[name].kill()
             self.nodes.pop(name).wait()
 
+    def open_page(self):
+        end = time.monotonic() + START_TIMEOUT
+        while True:
+            try:
+                urlopen(f"http://127.0.0.1:{self.port}/", timeout=5).close()
+                break
+            except OSError:
+                assert time.monotonic() < end, "the page is not served"
+                time.sleep(0.1)
+        self.browser.get(f"http://127.0.0.1:{self.port}/?theme=light")
+
     def run(self, script, *arguments):
         return self.browser.execute_script(script, *arguments)
 
@@ -82,18 +93,12 @@ class Site:
 def site(browser, tmp_path_factory):
     """Return what runs, with the page open as soon as it is served."""
     made = Site(browser, tmp_path_factory.mktemp("site"))
-    end = time.monotonic() + START_TIMEOUT
-    while True:
-        try:
-            urlopen(f"http://127.0.0.1:{made.port}/", timeout=5).close()
-            break
-        except OSError:
-            assert time.monotonic() < end, "the page is not served"
-            time.sleep(0.1)
-    browser.get(f"http://127.0.0.1:{made.port}/?theme=light")
-    yield made
-    made.kill(*list(made.nodes))
-    made.master.stop()
+    try:
+        made.open_page()
+        yield made
+    finally:
+        made.kill(*list(made.nodes))
+        made.master.stop()
 
 
 def test_1_the_map_the_sonar_and_the_position_are_drawn(site):

@@ -1,9 +1,5 @@
-import os
 import sys
 from pathlib import Path
-
-# As the programs do, before anything loads numpy: the matrices are small, and threads would wait for each other.
-os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 from hypothesis import HealthCheck, settings
 
