@@ -34,7 +34,7 @@ LONG = (
     "unaided_demo",
 )  # fmt: skip
 # Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds:
-# steps that others run beside do without.
+# only the steps that take longest do it twice.
 IN_PARALLEL = ("-n", str(os.cpu_count() or 1), "--dist", "loadfile")
 _PRINTING = threading.Lock()
 
@@ -86,7 +86,7 @@ def steps() -> List[Step]:
         _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
         *oldest_versions(),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
-        _pytest("long tests", "test/unit", "-m", "long", load=Load.SPARE),
+        _pytest("long tests", "test/unit", "-m", "long", *IN_PARALLEL, load=Load.SPARE),
         _pytest("recordings", "test/recordings", load=Load.SPARE),
         _pytest("documentation", "test/documentation", load=Load.SPARE),
         _damaged_files(),

@@ -58,6 +58,7 @@ def test_exact_fixes_put_the_map_where_it_is():
     np.testing.assert_allclose(apart(found.origin, [50.0, 50.0]), 0.0, atol=0.3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("azimuth_is_known", [True, False])
 @pytest.mark.parametrize("walked", [0.0, 3.0])
 def test_the_stated_accuracy_is_true_all_along_the_path(azimuth_is_known, walked):

@@ -27,7 +27,7 @@ from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
-pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested with every version")
+pytestmark = pytest.mark.long
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START, ASIDE = WHOLE.track.times[0], strafing()
@@ -186,7 +186,6 @@ def mapped():
     return {said: mapped_as(recording, "--set", "range_scale=1.02") for said, recording in recordings.items()}
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("said", FAULTS)
 def test_an_odometry_whose_axes_are_wrong_is_put_right_and_no_check_is_fine(mapped, said):
     found, right = mapped[said], mapped[FAULTS[said][0]]
@@ -197,14 +196,12 @@ def test_an_odometry_whose_axes_are_wrong_is_put_right_and_no_check_is_fine(mapp
     assert np.hypot(*(apart - apart[0]).T).max() < 1.0
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("said", FAULTS)
 def test_a_recording_that_is_mapped_anew_has_its_ranges_corrected_once(mapped, said):
     beams = mapped[said].recording.beams
     assert beams[0].beam.range_resolution == pytest.approx(WHOLE.beams[0].beam.range_resolution)
 
 
-@pytest.mark.long
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
     trust = mapped_as(broken.mount_turned(SHORT["ahead"], 120.0), "--fix-mount").findings.trust
     assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
@@ -249,7 +246,6 @@ def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
     assert slipped.begin == pytest.approx(START + 60.0, abs=10.0)
 
 
-@pytest.mark.long
 def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows():
     drifting = broken.compass_drifts(WHOLE, MIDDLE, 4.0)
     localiser = LocaliserParameters().build_localiser(drifting.sonar_in_base)

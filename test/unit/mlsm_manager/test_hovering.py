@@ -294,7 +294,7 @@ def test_a_post_behind_a_wall_is_not_missed():
     assert MissedPosts(Echoes.joined([near, behind]), 1).cost(TRUE) == 0.0
 
 
-@pytest.mark.newest_only("slow; paths are followed with every version by the other tests")
+@pytest.mark.long
 def test_paths_that_went_wrong_twice_are_led_back():
     wrong = stray(4, 14.0) + stray(9, -23.0) - TRUE
     search = ShiftSearch(HEARD, TURN * np.arange(SCANS + 1.0), 1, refit=lambda path: path)

@@ -146,7 +146,7 @@ def test_a_stored_map_gives_its_free_space_back(run):
     assert len(other.free) == len(localiser.free)
 
 
-@pytest.mark.newest_only("slow; the other tests follow vehicles with every version")
+@pytest.mark.long
 def test_where_positions_never_change_the_compass_is_taken_for_all_there_is():
     found, named = (PARAMETERS.changed(values).build_localiser(SONAR_IN_BASE) for values in ({}, HEADING))
     for scan in SCANS:
@@ -279,7 +279,7 @@ def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes,
     assert all(doubt in position_state(place, False, False, doubts)[1] for doubt in said)
 
 
-@pytest.mark.newest_only("slow; the other tests follow vehicles with every version")
+@pytest.mark.long
 def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
     for hour in (3600.0, -3600.0):
         localiser, _ = localiser_after(6)
@@ -324,7 +324,7 @@ def test_where_somebody_points_at_the_vehicle_it_is_searched():
     assert np.hypot(*(found.belief.theta[:2] - scan.reference_pose[:2])) < 0.3
 
 
-@pytest.mark.newest_only("slow; a vehicle that was found again is searched in the whole map with every version")
+@pytest.mark.long
 def test_after_a_jump_in_time_and_of_the_odometry_the_vehicle_is_found_in_its_map_and_nothing_is_mapped_twice():
     localiser, _ = localiser_after(9)
     before, shift = {tuple(cell) for cell in localiser.blocks.cells.tolist()}, np.array([12.0, -9.0, 0.4])

@@ -14,7 +14,7 @@ from mlsm_manager.joint_solver.places import PlaceCandidate
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 
-pytestmark = pytest.mark.newest_only("slow; test_batch_solver finds the first loop with every version")
+pytestmark = pytest.mark.long
 
 DRIFT = np.array([12.0, -6.0])
 SCANS = 32

@@ -89,7 +89,7 @@ def test_a_long_silence_is_followed_by_the_odometry():
     assert localiser.believed_until == SECONDS + 121.0
 
 
-@pytest.mark.newest_only("slow; test_joint searches a whole map with every version")
+@pytest.mark.long
 def test_relocalisation_finds_the_newest_scan_anywhere_in_the_map():
     localiser, _ = localiser_after(1, estimator=EstimatorName.THESIS)
     localiser.take_scan(scan_of(harbour(), still(), still((40.0, -70.0, 2.5)), start=SECONDS))
@@ -98,7 +98,7 @@ def test_relocalisation_finds_the_newest_scan_anywhere_in_the_map():
     np.testing.assert_allclose(update.result.pose, np.zeros(3), atol=0.05)
 
 
-@pytest.mark.newest_only("slow; test_joint searches a whole map with every version")
+@pytest.mark.long
 def test_relocalisation_believes_no_scan_alone():
     localiser, _ = localiser_after(1, estimator=EstimatorName.THESIS)
     update = localiser.relocalise()
@@ -246,13 +246,13 @@ def found(scan, estimator):
     return relocalised(scan, estimator.matched.blocks, matcher, OdometryErrors())
 
 
-@pytest.mark.newest_only("slow; test_joint searches a whole map with every version")
+@pytest.mark.long
 def test_relocalisation_along_a_wall_is_refused():
     estimator, _ = mapped([scan_of(wall((-20, 10), (20, 10)), still())])
     assert not found(scan_of(wall((-10, 10), (10, 10)), still()), estimator).accepted
 
 
-@pytest.mark.newest_only("slow; test_joint searches a whole map with every version")
+@pytest.mark.long
 @pytest.mark.parametrize(("aside", "is_found"), [(1.2, True), (5.0, False)])
 def test_relocalisation_in_a_map_with_everything_twice_covers_both_poses_of_one_place(aside, is_found):
     blocks = map_of(np.vstack([harbour(), harbour() + np.array([aside, 0.0])]))

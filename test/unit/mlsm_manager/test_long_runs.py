@@ -126,7 +126,7 @@ def session_of(scans, parameters):
     return session
 
 
-@pytest.mark.newest_only("slow; the other tests forget with every version")
+@pytest.mark.long
 def test_a_run_that_forgets_is_judged_as_one_that_does_not(forgetful):
     scans = tour(42, path=round_and_round).scans
     whole = [verdict.name for verdict in session_of(scans[:20], forgetful).verdicts()]
@@ -135,7 +135,7 @@ def test_a_run_that_forgets_is_judged_as_one_that_does_not(forgetful):
     assert [verdict.name for verdict in session.verdicts()] == whole
 
 
-@pytest.mark.newest_only("slow; the other tests forget with every version")
+@pytest.mark.long
 def test_a_run_goes_on_after_a_silence_that_is_longer_than_what_it_keeps(forgetful):
     made = tour(58, path=round_and_round)
     silent = [scan.without_points(scan.reference_time) for scan in made.scans[12:56]]

@@ -30,6 +30,7 @@ def track_of(recording):
     )
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("seconds", [0.0, -1.0, 20.0, -300.0])
 def test_the_echoes_tell_how_far_the_clocks_are_apart(seconds):
     made = wandering()

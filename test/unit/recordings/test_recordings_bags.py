@@ -69,7 +69,7 @@ def test_what_is_written_is_read_again(tmp_path, compression):
             ]
 
 
-@pytest.mark.newest_only("slow; the other bags are read with every version")
+@pytest.mark.long
 def test_a_bag_of_2015_gives_what_the_same_bag_of_today_gives(tmp_path, expected):
     with_old_types(BASIN, tmp_path / "old.bag")
     assert_same(read_recording(tmp_path / "old.bag", NAMES), expected)

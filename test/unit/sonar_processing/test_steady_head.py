@@ -91,6 +91,7 @@ def _swing(count):
     return np.tile(one, 600 // len(one) + 1)[:600]
 
 
+@pytest.mark.long
 @given(st.integers(2, 150), st.sampled_from([1, -1]), st.floats(0.0, 0.5), st.integers(0, 99))
 def test_a_head_that_sweeps_a_sector_and_loses_beams_is_left_as_it_is(count, direction, lost, seed):
     kept = np.random.RandomState(seed).uniform(size=600) >= lost

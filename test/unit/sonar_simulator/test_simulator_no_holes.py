@@ -18,7 +18,7 @@ from sonar_simulator.simulation.sonar_head import SonarHead, SonarParameters
 from sonar_simulator.world.world import Shape, World
 from sonar_simulator.world.world_file import load_world
 
-pytestmark = pytest.mark.newest_only("slow; beams are simulated with every version")
+pytestmark = pytest.mark.long
 
 WORLDS = Path(__file__).resolve().parents[3] / "worlds"
 NOISE_FREE = {

@@ -8,7 +8,7 @@ from node_support.geometry import pose_matrix, yaw_of
 from sonar_simulator.simulation.odometry import Odometry, OdometryParameters
 from sonar_simulator.simulation.scripted_vehicle import VehicleScript, VehicleState
 
-pytestmark = pytest.mark.newest_only("slow; bags are simulated with every version")
+pytestmark = pytest.mark.long
 
 START = {"x": 10.0, "y": 5.0, "z": -2.0, "yaw_deg": 20.0}
 WAY = VehicleScript.from_yaml_data(
