@@ -58,6 +58,8 @@ _HALF_DIAGONAL = 0.7072  # of a cell, in sides, rounded up
 _SLACK = 1e-9  # m, and of a squared distance: so far may it be rounded
 _NEVER = 1e300  # m^2: no point is so far away
 _FIRST_CAPACITY = 1024
+_NONE = np.int64(0)
+"""To count from: for a plain 0 numba would compile what takes the number twice, for this 0 and for any number."""
 
 _Targets = namedtuple("_Targets", "x y scan block row")
 """Points in the order of their cells; row: (k,) where each stood before."""
@@ -207,14 +209,14 @@ def _write_nearest(blocks, cut, tie, near, candidates, found, made):
         if near.square[nearest] >= cut * cut:
             continue
         distance = np.sqrt(near.square[nearest])
-        limit, held = (distance + tie) ** 2 * (1.0 + _SLACK), 0
+        limit, held = (distance + tie) ** 2 * (1.0 + _SLACK), _NONE
         for place in range(start, end):
             held += near.square[place] <= limit
         if held == 1:
             found.neighbours[made], found.distances[made], found.shares[made] = near.row[nearest], distance, 1.0
             made += 1
             continue
-        held = 0
+        held = _NONE
         for place in range(start, end):
             if near.square[place] <= limit:
                 held = _kept(candidates, held, np.sqrt(near.square[place]), near.row[place])
@@ -274,7 +276,7 @@ def shared_neighbours(sources, source_scans, places, scans, blocks, cut, tie):
     candidates = _Candidates(np.empty(CANDIDATES), np.empty(CANDIDATES, np.int64))
     found = _Found(np.empty(_FIRST_CAPACITY, np.int64), np.empty(_FIRST_CAPACITY), np.empty(_FIRST_CAPACITY))
     starts, ends = np.zeros(len(sources), np.int64), np.zeros(len(sources), np.int64)
-    made = 0
+    made = _NONE
     for cell in range(grid.rows * grid.columns):
         own = source_order[source_starts[cell] : source_starts[cell + 1]]
         if not len(own):

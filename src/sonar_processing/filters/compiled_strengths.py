@@ -59,7 +59,10 @@ def count_strengths(points, stamps):
         lowest = strength if strength < lowest else lowest
         highest = strength if strength > highest else highest
         counts[point % _COUNTERS, level] += 1
-    return counts.sum(axis=0), np.array([lowest, highest, weakest], np.float32)
+    for counter in range(1, _COUNTERS):
+        for level in range(_SILENT + 1):
+            counts[0, level] += counts[counter, level]
+    return counts[0], np.array([lowest, highest, weakest], np.float32)
 
 
 @compiled(int64[::1](_POINTS, _STAMPS, float32))
