@@ -22,9 +22,9 @@ from benchmarks.fault_rows import faults
 from benchmarks.harness import WHOLE_MARINA, benchmark_parser, compass_alone, mapped_as, marina, recorded
 from benchmarks.tours import simulated
 from mlsm_manager.offline.bag_mapping import MappedBag
-from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, read_recording, track_between
 from mlsm_manager.offline.run_files import position_error
+from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Track
 from recordings.bags.bag import RecordingError
 from recordings.reader import Request

@@ -7,9 +7,8 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan_path import POSITION
 from mlsm_manager.self_check.causes import Cause
-from mlsm_manager.self_check.headline import FEWEST_MATCHED
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
-from mlsm_manager.self_check.verdict import Verdict
+from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Verdict
 from node_support.health import Health, Level
 
 _TOLD = 60.0  # s: so long a fault that was left out is told: some turns of the head, which show the place

@@ -17,7 +17,7 @@ from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKi
 from mlsm_manager.odometry.faults import Mirror
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.offline.findings import Findings, Trust
+from mlsm_manager.offline.findings import Findings
 from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
@@ -31,6 +31,7 @@ from mlsm_manager.offline.suited_parameters import (
     with_cells,
     with_odometry,
 )
+from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
 from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault, of_steps, of_stuck, ranked
@@ -96,50 +97,62 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     if odometry.kind is OdometryKind.HEADING and not _is_named(options):
         recording = recording.without_positions()
     beams, companions = without_companions(recording.beams, recording.track)
-    recording = replace(recording, beams=beams)
     extractor = EchoExtractor(options.parameters.echoes())
-    recording, scans, mounted, signs, over = _heard(recording, odometry, extractor, options)
+    heard = _heard(replace(recording, beams=beams), odometry, extractor, options)
+    recording, causes = heard.recording, [*causes, *heard.over, *companions]
     extracting = options.parameters.changed(extractor.newest_parameters.to_mapping())
-    extracting = with_cells(extracting, scans, options.fixed)
-    odometry, parameters, replayed = _followed(recording, scans, extracting, odometry, options)
+    extracting = with_cells(extracting, heard.scans, options.fixed)
+    odometry, parameters, replayed = _followed(recording, heard.scans, extracting, odometry, options)
     _tell_of_refused(replayed, options)
-    causes = [*causes, *over, *companions]
-    found = echo_findings(scans, recording.sonar_in_base, replayed.corrections)
+    found = echo_findings(heard.scans, recording.sonar_in_base, replayed.corrections)
     if not odometry.put_right.text and _moves_are_turned(recording, found.mount, options):
         track, cause, assumed = put_right(recording.track, found.mount)
         known = odometry._replace(put_right=assumed)
-        return _mapped(recording.with_track(track), [*causes, *mounted, cause], known, options)
-    of_echoes = [*mounted, *found.causes]
-    of_beams = [*beam_causes(recording.beams), *standing_causes(scans, recording.track, replayed.corrected)]
-    refined, refitted = None, []
-    if options.refine:
-        suspected = [cause.fault for cause in (*of_echoes, *of_beams) if cause.fault is not None]
-        refined = _refined(replayed, recording.track, parameters, [*found.suspected, *suspected])
+        return _mapped(recording.with_track(track), [*causes, *heard.mounted, cause], known, options)
+    of_echoes = [*heard.mounted, *found.causes]
+    of_beams = [*beam_causes(recording.beams), *standing_causes(heard.scans, recording.track, replayed.corrected)]
+    refined = _refined(replayed, recording.track, parameters, found.suspected, [*of_echoes, *of_beams], options)
     runs = _runs(replayed, refined)
-    if found.mount == AS_TOLD and _positions_mislead(recording, scans, extracting, odometry, runs, options):
+    if found.mount == AS_TOLD and _positions_mislead(recording, heard.scans, extracting, odometry, runs, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
         cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
-        return _mapped(recording, [*causes, *mounted, cause], OdometryFound(OdometryKind.HEADING, reason), options)
+        known = OdometryFound(OdometryKind.HEADING, reason)
+        return _mapped(recording, [*causes, *heard.mounted, cause], known, options)
+    causes += [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
+    return _judged(heard, odometry, parameters, replayed, refined, ranked(causes), options)
+
+
+def _refined(
+    replayed: Replayed, track: Track, parameters: ReplayParameters, suspected: Sequence[Fault],
+    causes: Sequence[Cause], options: Namespace,
+) -> Optional[Refined]:  # fmt: skip
+    """Return the fit of the whole run, where one is asked for, with faults mended that are suspected, or causes."""
+    if not options.refine:
+        return None
+    suspected = [*suspected, *(cause.fault for cause in causes if cause.fault is not None)]
+    with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
+        return refine(replayed, track, parameters.map_settings(), suspected, bar.update)
+
+
+def _judged(
+    heard: "_Heard", odometry: OdometryFound, parameters: ReplayParameters, replayed: Replayed,
+    refined: Optional[Refined], causes: List[Cause], options: Namespace,
+) -> MappedBag:  # fmt: skip
+    """Return what was made of a recording, checked, and of those added to its map. causes: ranked."""
+    further = [heard.signs.turns()]
     if options.check:
         with _bar(REFITS, "fit", "check") as bar:
-            refitted = refitted_verdicts(refined.solution, refined.batch, bar.update)
+            further += refitted_verdicts(refined.solution, refined.batch, bar.update)
     if replayed.hypotheses is not None and replayed.hypotheses.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
-    of_run = [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
-    causes = ranked([*causes, *of_run])
-    findings, further = None, [signs.turns(), *refitted]
+    findings, known = None, parameters
     if replayed.solver is not None:
-        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, mounted))
-    known = parameters if findings is None else findings.calibration.applied(parameters)
+        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, heard.mounted))
+        known = findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
     title = " ".join(bag.name for bag in options.bags)
-    return MappedBag(title, recording, odometry, known, replayed, refined, findings, sessions, run)
-
-
-def _refined(replayed: Replayed, track: Track, parameters: ReplayParameters, suspected: Sequence[Fault]) -> Refined:
-    with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
-        return refine(replayed, track, parameters.map_settings(), suspected, bar.update)
+    return MappedBag(title, heard.recording, odometry, known, replayed, refined, findings, sessions, run)
 
 
 def _is_named(options: Namespace) -> bool:

@@ -1,7 +1,7 @@
 """What the joint solver found in a run besides the path: the calibration, and whether the run can be trusted."""
 
-from dataclasses import dataclass, fields, replace
-from typing import Any, Dict, List, Optional, Sequence, Tuple, Union
+from dataclasses import dataclass, fields
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -14,17 +14,15 @@ from mlsm_manager.joint_solver.normal_equations import RUN_COLUMNS
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed, ReplayParameters
-from mlsm_manager.report.mission import Uncertainty
+from mlsm_manager.offline.trust import Trust, radii
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
-from mlsm_manager.self_check.headline import headline, is_told
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
     halves_agree,
     odometry_decided,
-    per_minute,
     position_uncertainty,
 )
 from mlsm_manager.self_check.verdict import Verdict
@@ -108,115 +106,67 @@ class Calibration:
         )
 
 
-@dataclass(frozen=True)
-class Trust:
-    """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
+class _BestPath(NamedTuple):
+    """A path as well as a run knows it. poses: (m, 3) T_map_base at the times of the replay. solution: of the solver.
 
-    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
-    nobody measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing
-    tells.
+    times: (k,) s of its nodes, with places (k, 2) [m], covariances (k, 2, 2) [m^2], and deviations (k,) [m] that are
+    expected whatever the water tells.
     """
 
-    verdicts: List[Verdict]
+    poses: np.ndarray
+    solution: Solution
     times: np.ndarray
+    places: np.ndarray
     covariances: np.ndarray
-    matched: int
-    causes: Sequence[Cause] = ()
-    assumed: str = ""
-    if_so: float = np.nan
-
-    @property
-    def line(self) -> str:
-        """One line for people."""
-        deviation, begin = float(self.deviations.max()), float(self.times[0])
-        return headline(self.verdicts, self.matched, deviation, self.causes, begin, self.assumed, self.if_so)
-
-    @property
-    def deviations(self) -> np.ndarray:
-        """(k,) m, 2-D standard deviations of the position in map, as stated at `times`."""
-        return _radii(self.covariances)
-
-    @property
-    def uncertainty(self) -> Optional[Uncertainty]:
-        """What picture and report show of it; None where nothing can be said of the position."""
-        told = is_told(self.verdicts, self.matched, self.assumed, self.if_so)
-        return Uncertainty(self.times, self.covariances, self.doubtful) if told else None
-
-    @property
-    def doubtful(self) -> np.ndarray:
-        """(k, 2) s, beginnings and ends of the stretches that made a check fire."""
-        return np.concatenate([np.empty((0, 2)), *(v.doubtful for v in self.verdicts if v.fires)])
-
-    def to_mapping(self) -> Dict[str, Any]:
-        """Return the checks and the deviation per minute for summary.json."""
-        checks = {
-            verdict.name: {
-                "value": None if np.isnan(verdict.value) else round(verdict.value, 3),
-                "limit": verdict.limit,
-                "fires": verdict.fires,
-                "answer": verdict.answer.value,
-                "meaning": verdict.text,
-            }
-            for verdict in self.verdicts
-        }
-        minutes = per_minute(self.times, self.deviations)
-        told = np.isfinite(minutes) & (self.uncertainty is not None)
-        stated = [round(float(value), 2) if known else None for value, known in zip(minutes, told)]
-        causes = [cause.to_mapping(float(self.times[0])) for cause in self.causes]
-        return {"causes": causes, "checks": checks, "deviation_per_minute": stated}
+    expected: np.ndarray
 
 
-def _trust(
-    replayed: Replayed,
-    refined: Optional[Refined],
-    calibration: Calibration,
-    further: Sequence[Verdict],
-    causes: Sequence[Cause],
-    assumed: Assumption,
-) -> Trust:
-    """Return what the checks say of a run of the joint solver; of the refined path where there is one."""
+def _live_path(replayed: Replayed) -> _BestPath:
+    solver = replayed.solver
+    times, places = (np.array(ones) for ones in zip(*((one.time, one.T_map_base[:2]) for one in solver.estimates)))
+    covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
+    expected = solver.expected_deviations(solver.estimates)
+    return _BestPath(replayed.corrected, solver.solution, times, places, covariances, expected)
+
+
+def _refined_path(refined: Refined, solver: LiveSolver) -> _BestPath:
+    times = refined.batch.node_times
+    places = refined.solution.node_places(np.arange(len(times)))
+    lengths = np.full(len(times), solver.estimates[-1].length_deviation)
+    directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
+    expected = expected_deviations(places - places[0], lengths, directions)
+    covariances = refined.batch.pose_covariances[:, :2, :2] + refined.motion.spread(times)
+    return _BestPath(refined.poses, refined.solution, times, places, covariances, expected)
+
+
+def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> List[Verdict]:
+    """Return what the checks say of a run of the joint solver."""
     solver = replayed.solver
     parts, apart = solver.parameters.parts_per_turn, solver.submaps.apart
     turns = Turns.of(solver.estimates, apart, parts)
     heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.surfaces.counts, solver.log.scan_count)
-    if refined is None:
-        path, solution, times = replayed.corrected, solver.solution, np.array([one.time for one in solver.estimates])
-        covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
-        places = np.array([one.T_map_base[:2] for one in solver.estimates])
-        expected = solver.expected_deviations(solver.estimates)
-    else:
-        path, solution, times = refined.poses, refined.solution, refined.batch.node_times
-        covariances = refined.batch.pose_covariances[:, :2, :2] + refined.motion.spread(times)
-        places = solution.node_places(np.arange(len(times)))
-        lengths = np.full(len(times), solver.estimates[-1].length_deviation)
-        directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
-        expected = expected_deviations(places - places[0], lengths, directions)
     start, before = float(solver.log.node_times[0]), Calibration.expected(solver)
-    verdicts = [
-        *_against_odometry_or_before(replayed, path, solution, turns.times),
+    return [
+        *_against_odometry_or_before(replayed, best.poses, best.solution, turns.times),
         recent_agreement(heard.times, heard.agreements),
-        position_uncertainty(times, _radii(covariances), expected),
+        position_uncertainty(best.times, radii(best.covariances), best.expected),
         *surfaces_tell(start, turns.times, turns.surfaces, solver.distance_deviation),
         *in_submaps(turns.times, turns.apart),
         as_expected(before.names, before.values, before.deviations, calibration.values),
         *_halves(solver),
         *odometry_decided(replayed.hypotheses.doubt),
     ]
-    reported = Track(replayed.times, replayed.odometry).at(times)[:, :2]
+
+
+def _trust(
+    replayed: Replayed, best: _BestPath, verdicts: List[Verdict], causes: Sequence[Cause], assumed: Assumption
+) -> Trust:
+    """Return how far a path can be trusted, with what causes add to what is stated."""
+    reported = Track(replayed.times, replayed.odometry).at(best.times)[:, :2]
     # A path that went astray may be far too short, and an odometry without positions has none.
-    ways = max((places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
-    covariances = widened(covariances, times, ways, causes)
-    verdicts = [verdict.assuming(assumed.text) for verdict in (*verdicts, *further)]
-    trust = Trust(verdicts, times, covariances, replayed.matched, causes, assumed.text)
-    if np.isnan(assumed.turn):
-        return trust
-    if_not = widened(covariances, times, ways, [Cause(assumed.text, CERTAIN, turn=assumed.turn)])
-    return replace(trust, covariances=if_not, if_so=float(trust.deviations.max()))
-
-
-def _radii(covariances: np.ndarray) -> np.ndarray:
-    """Return (k,) m, the roots of the sums of both variances (k, 2, 2)."""
-    return np.sqrt(np.trace(covariances, axis1=1, axis2=2))
+    ways = max((best.places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
+    covariances = widened(best.covariances, best.times, ways, causes)
+    return Trust(verdicts, best.times, covariances, replayed.matched, causes).assuming(assumed, ways)
 
 
 def _against_odometry_or_before(
@@ -269,10 +219,12 @@ class Findings:
         """
         solver = replayed.solver
         if refined is None:
-            calibration, closing = Calibration.found(solver, solver.estimates[-1]), None
+            calibration, best, closing = Calibration.found(solver, solver.estimates[-1]), _live_path(replayed), None
         else:
-            calibration, closing = Calibration.of_batch(solver, refined.batch), refined.closing
-        return cls(calibration, _trust(replayed, refined, calibration, further, causes, assumed), closing)
+            calibration, best = Calibration.of_batch(solver, refined.batch), _refined_path(refined, solver)
+            closing = refined.closing
+        verdicts = [*_checks(replayed, best, calibration), *further]
+        return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return what summary.json holds of it."""

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
-from mlsm_manager.self_check.headline import FEWEST_MATCHED
-from mlsm_manager.self_check.verdict import Answer
+from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer
 from node_support.errors import counted
 
 _PAGE = """<!DOCTYPE html>

@@ -8,9 +8,9 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence
 import numpy as np
 
 from georeferencing.origin import Origin
-from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
+from mlsm_manager.offline.trust import Trust
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.formats import write_ply

@@ -12,9 +12,9 @@ from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.charts import CHART_FILES
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
 from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, positions_at, trajectories_of
+from mlsm_manager.offline.trust import WITHIN
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.headline import WITHIN
 from node_support.errors import counted
 from node_support.geometry import move_of, transformed
 

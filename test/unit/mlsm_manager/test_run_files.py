@@ -14,11 +14,12 @@ from georeferencing.asked import AskedOrigin
 from georeferencing.origin import STORED as STORED_ORIGIN
 from georeferencing.origin import Origin
 from mlsm_manager.offline.charts import origin_of_fixes, satellite_fixes
-from mlsm_manager.offline.findings import Trust
 from mlsm_manager.offline.recording import Recording, Truth, scans_of
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, ReplayParameters, replay
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
+from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import Assumption
 from mlsm_manager.self_check.verdict import Answer, Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.errors import RefusedInput
@@ -136,7 +137,7 @@ def test_the_headline_says_fine_only_of_what_was_measured(verdicts, matched, lin
 
 def test_no_check_is_fine_of_a_path_that_was_only_assumed():
     verdicts = [one.assuming("it was held still") for one in (FINE, SHORT)]
-    trust = replace(trust_of(*verdicts), assumed="it was held still")
+    trust = replace(trust_of(*verdicts), assumed=Assumption("it was held still"))
     assert [one.answer for one in verdicts] == [Answer.NOT_MEASURED] * 2
     assert trust.line == "trust: NOT MEASURED: it was held still; nothing can be said of the position"
     assert FIRING.assuming("it was held still") is FIRING
@@ -148,13 +149,13 @@ def test_no_check_is_fine_of_a_path_that_was_only_assumed():
 )
 def test_of_an_odometry_that_was_put_right_is_said_how_well_the_position_is_known_if_that_is_so(if_so, known):
     verdicts = [one.assuming("it was turned") for one in (FINE, SHORT)]
-    trust = replace(trust_of(*verdicts), assumed="it was turned", if_so=if_so)
+    trust = replace(trust_of(*verdicts), assumed=Assumption("it was turned"), if_so=if_so)
     assert trust.line == f"trust: NOT MEASURED: it was turned; {known}"
     assert trust.uncertainty is not None
 
 
 def test_nothing_is_said_of_the_position_by_an_assumption_where_no_check_had_enough_data():
-    trust = replace(trust_of(SHORT.assuming("it was turned")), assumed="it was turned", if_so=1.0)
+    trust = replace(trust_of(SHORT.assuming("it was turned")), assumed=Assumption("it was turned"), if_so=1.0)
     assert trust.line == "trust: NOT MEASURED: it was turned; nothing can be said of the position"
     assert trust.uncertainty is None
 

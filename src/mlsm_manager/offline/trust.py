@@ -1,0 +1,133 @@
+"""How far a run can be trusted: what contradicts, what was not measured, and how well the position is known."""
+
+from dataclasses import dataclass, replace
+from typing import Any, Dict, List, Optional, Sequence
+
+import numpy as np
+
+from mlsm_manager.report.mission import Uncertainty
+from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
+from mlsm_manager.self_check.path_checks import per_minute
+from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer, Verdict
+from node_support.errors import counted
+
+WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
+
+
+@dataclass(frozen=True)
+class Trust:
+    """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
+
+    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
+    nobody measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing
+    tells.
+    """
+
+    verdicts: List[Verdict]
+    times: np.ndarray
+    covariances: np.ndarray
+    matched: int
+    causes: Sequence[Cause] = ()
+    assumed: Assumption = NOTHING_ASSUMED
+    if_so: float = np.nan
+
+    def assuming(self, assumed: Assumption, places: np.ndarray) -> "Trust":
+        """Return that of a path that rests on what nobody measured: no check is fine, it may be turned, if not so.
+
+        places: (k, 2) m, the path.
+        """
+        verdicts = [verdict.assuming(assumed.text) for verdict in self.verdicts]
+        held = replace(self, verdicts=verdicts, assumed=assumed)
+        if np.isnan(assumed.turn):
+            return held
+        turned = Cause(assumed.text, CERTAIN, turn=assumed.turn)
+        if_not = widened(self.covariances, self.times, places, [turned])
+        return replace(held, covariances=if_not, if_so=float(self.deviations.max()))
+
+    @property
+    def line(self) -> str:
+        """What the checks say, as one line for people."""
+        begin = float(self.times[0])
+        fine, doubtful, missing = ([one for one in self.verdicts if one.answer is answer] for answer in Answer)
+        wrong = [cause.line(begin) for cause in self.causes if not cause.is_mended]
+        mended = "".join(f"; mended: {cause.line(begin)}" for cause in self.causes if cause.is_mended)
+        if wrong or doubtful:
+            said = "; ".join([*wrong, *(one.text for one in doubtful)])
+            known = f"at best {self._known}" if self._is_told else _NOTHING
+            return f"trust: DOUBTFUL: {said}{mended}; {known}"
+        if self.matched < FEWEST_MATCHED or not fine:
+            return f"trust: NOT MEASURED: {self._not_measured}{mended}"
+        if missing:
+            names = ", ".join(one.name for one in missing)
+            told = f"{len(fine)} of {len(self.verdicts)} checks are fine, NOT MEASURED: {names}"
+            return f"trust: {told}; {self._known} if these are fine too{mended}"
+        return f"trust: all {len(self.verdicts)} checks are fine, nothing contradicts: {self._known}{mended}"
+
+    @property
+    def _known(self) -> str:
+        """How well the position is known, if what is assumed is so."""
+        return f"position {_within(float(self.deviations.max()) if np.isnan(self.if_so) else self.if_so)}"
+
+    @property
+    def _not_measured(self) -> str:
+        reason = self.assumed.text or f"none of {len(self.verdicts)} checks had enough data"
+        if self.matched < FEWEST_MATCHED:
+            reason = f"{counted(self.matched, 'scan')} matched, {FEWEST_MATCHED} needed"
+        if not self._is_told:
+            return f"{reason}; {_NOTHING}"
+        deviation = float(self.deviations.max())
+        otherwise = f", {_within(deviation)} if not" if deviation > self.if_so else ""
+        return f"{reason}; {self._known} if so{otherwise}"
+
+    @property
+    def _is_told(self) -> bool:
+        """Whether the checks say anything of the position."""
+        answers = {verdict.answer for verdict in self.verdicts}
+        assumed = not np.isnan(self.if_so) and any(one.text == self.assumed.text for one in self.verdicts)
+        is_fine = Answer.FINE in answers or assumed
+        return Answer.DOUBTFUL in answers or (is_fine and self.matched >= FEWEST_MATCHED)
+
+    @property
+    def deviations(self) -> np.ndarray:
+        """(k,) m, 2-D standard deviations of the position in map, as stated at `times`."""
+        return radii(self.covariances)
+
+    @property
+    def uncertainty(self) -> Optional[Uncertainty]:
+        """What picture and report show of it; None where nothing can be said of the position."""
+        return Uncertainty(self.times, self.covariances, self.doubtful) if self._is_told else None
+
+    @property
+    def doubtful(self) -> np.ndarray:
+        """(k, 2) s, beginnings and ends of the stretches that made a check fire."""
+        return np.concatenate([np.empty((0, 2)), *(v.doubtful for v in self.verdicts if v.fires)])
+
+    def to_mapping(self) -> Dict[str, Any]:
+        """Return the checks and the deviation per minute for summary.json."""
+        checks = {
+            verdict.name: {
+                "value": None if np.isnan(verdict.value) else round(verdict.value, 3),
+                "limit": verdict.limit,
+                "fires": verdict.fires,
+                "answer": verdict.answer.value,
+                "meaning": verdict.text,
+            }
+            for verdict in self.verdicts
+        }
+        minutes = per_minute(self.times, self.deviations)
+        told = np.isfinite(minutes) & (self.uncertainty is not None)
+        stated = [round(float(value), 2) if known else None for value, known in zip(minutes, told)]
+        causes = [cause.to_mapping(float(self.times[0])) for cause in self.causes]
+        return {"causes": causes, "checks": checks, "deviation_per_minute": stated}
+
+
+_NOTHING = "nothing can be said of the position"
+
+
+def _within(deviation: float) -> str:
+    return f"within {WITHIN * deviation:.1f} m"
+
+
+def radii(covariances: np.ndarray) -> np.ndarray:
+    """Return (k,) m, the roots of the sums of both variances (k, 2, 2)."""
+    return np.sqrt(np.trace(covariances, axis1=1, axis2=2))
