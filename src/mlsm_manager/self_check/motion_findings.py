@@ -26,7 +26,7 @@ from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, is
 from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
-from mlsm_manager.self_check.map_checks import scans_go_on
+from mlsm_manager.self_check.map_checks import go_astray
 from node_support.geometry import move_of, rotated, transformed
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
@@ -253,7 +253,7 @@ def goes_on_with_other_ranges(run: Solution, track: Track) -> bool:
     if best is None or best.gain < _NATS_ALONE:
         return False
     shares = shares_heard_before(replace(best.run, state=best.fit.state), 0)
-    return not scans_go_on(run.log.node_times[1:], shares, _GO_ON).fires
+    return not go_astray(run.log.node_times[1:], shares, _GO_ON)
 
 
 def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:

@@ -62,8 +62,9 @@ def test_echoes_tell_that_it_strafes(ahead, hovering):
     assert strafes(ahead, hovering)
 
 
-def test_a_short_run_does_not_tell(ahead):
-    assert not may_strafe(ahead.solution)
+def test_two_minutes_tell_that_it_may_strafe_and_one_does_not(ahead):
+    assert may_strafe(ahead.solution)
+    assert not may_strafe(solver_of(OdometryKind.HEADING, MADE.scans[:6]).solution)
 
 
 def test_refined_it_is_as_near_as_echoes_tell():
