@@ -19,6 +19,7 @@ from mlsm_manager.joint_solver.normal_equations import (
     NormalEquations,
     Residuals,
     State,
+    prior_of,
     solution_of,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -164,7 +165,7 @@ def _misfit(run: Solution) -> np.ndarray:
 
 class _Batch:
     def __init__(self, solution: Solution, loops: Sequence[Loop] = (), fixed_steps: Optional[State] = None) -> None:
-        log, odometry, self.state = solution.log, solution.odometry, solution.state
+        log, odometry, self.state = solution.log, solution.parameters.odometry, solution.state
         self._run, self._odometry, self._parameters = solution, odometry, solution.parameters
         self._layout = Layout(0, log.scan_count, odometry.width)
         self._motion = log.node_motion(np.arange(log.scan_count + 1))
@@ -222,8 +223,8 @@ class _Batch:
         value = np.append(self.state.nodes[0], self.state.run)
         mean = np.append(odometry.first_node(), parameters.run_mean(self._run.log))
         deviations = np.append(odometry.first_deviations(), parameters.run_deviations(self._run.log))
-        equations.add_prior(self._layout.with_run(np.array([0]))[0], value, mean, deviations)
-        equations.add(*odometry.steps(self._layout.step_starts, self.state.nodes, self._motion))
+        first = prior_of(self._layout.with_run(np.array([0]))[0], value - mean, deviations)
+        equations.add(first, *odometry.steps(self._layout.step_starts, self.state.nodes, self._motion))
         if self._fixed_steps is not None:
             now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
             _add_fixed_steps(equations, self._layout, now, fixed)

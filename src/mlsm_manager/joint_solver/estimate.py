@@ -66,14 +66,10 @@ class LiveEstimate:
         return float(np.hypot(np.sqrt(variance), self.world_scale_deviation))
 
     @property
-    def node_deviations(self) -> np.ndarray:
-        """(width,) standard deviations of `node` if the frozen map had no error."""
-        return np.sqrt(np.diag(self.own_covariance)[:-RUN_COLUMNS])
-
-    @property
-    def run_deviations(self) -> np.ndarray:
-        """(2,) standard deviations of `run`: errors of the frozen map bend it as they bend the path."""
-        return np.sqrt(np.diag(self.covariance)[-RUN_COLUMNS:])
+    def deviations(self) -> np.ndarray:
+        """(width + 2,) standard deviations of `node` if the frozen map had no error, and of `run`, which these bend."""
+        of_node, of_run = np.diag(self.own_covariance)[:-RUN_COLUMNS], np.diag(self.covariance)[-RUN_COLUMNS:]
+        return np.sqrt(np.append(of_node, of_run))
 
     @property
     def velocity(self) -> np.ndarray:
@@ -84,8 +80,9 @@ class LiveEstimate:
     @property
     def velocity_covariance(self) -> np.ndarray:
         """(3, 3) of `velocity`: what the unknowns of the newest node leave open, without noise of what is reported."""
-        by_gain = np.exp(1j * self.drift.values[4]) * as_complex(self.reported_velocity)
-        by_direction = 1j * self._gain * as_complex(self.reported_velocity)
+        reported = as_complex(self.reported_velocity)
+        by_gain = np.exp(1j * self.drift.values[4]) * reported
+        by_direction = 1j * self._gain * reported
         by_drift = np.eye(3, len(self.drift.values))
         by_drift[:2, 3] = by_gain.real, by_gain.imag
         by_drift[:2, 4] = by_direction.real, by_direction.imag

@@ -1,7 +1,7 @@
 """Two solvers of the same scans where nobody knows which odometry a vehicle has; the echoes tell which one is right."""
 
 from dataclasses import replace
-from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence
+from typing import Dict, List, Mapping, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -104,8 +104,8 @@ class Hypotheses:
         """What the echoes tell of the odometry; empty where it was named."""
         if np.isnan(self._dvl_lead):
             return ""
-        other = self._dvl if self.other is None else self._name(self.other)
-        return likelier(self._name(self.shown), self.lead, other)
+        shown, other = self._names
+        return likelier(shown, self.lead, other)
 
     @property
     def lead(self) -> float:
@@ -179,17 +179,19 @@ class Hypotheses:
         return self._unsure.odometry.mixture.rival_lead(told)
 
     @property
-    def _dvl(self) -> str:
-        return self._unsure.odometry.mixture.rival.name
-
-    def _name(self, solver: LiveSolver) -> str:
-        return self._dvl if solver is not self._unsure else solver.odometry.mixture.likeliest(solver.told).name
+    def _names(self) -> Tuple[str, str]:
+        """Names of the odometry that is shown, and of the other one."""
+        unsure, mixture = self._unsure, self._unsure.odometry.mixture
+        names = mixture.likeliest(unsure.told).name, mixture.rival.name
+        return names if self.shown is unsure else names[::-1]
 
     def _know(self, places: np.ndarray, others: np.ndarray, added: np.ndarray, own: float) -> None:
         """Keep the doubt where it is the largest."""
         apart = np.hypot(*(others - places)[:, :2].T)
         deviation = np.sqrt(np.maximum(np.trace(added[:, :2, :2], axis1=1, axis2=2), 0.0))
-        self.doubt = Doubt(self.told, self._name(self.other), float(apart.max()), float(deviation.max()), own)
+        shown, other = self._names
+        told = likelier(shown, self.lead, other)
+        self.doubt = Doubt(told, other, float(apart.max()), float(deviation.max()), own)
 
 
 def likelier(shown: str, lead: float, other: str) -> str:

@@ -150,7 +150,7 @@ class LiveSolver:
         """Relative standard deviation of reported distances as known now; infinite where none are reported."""
         if self.odometry.mixture is None or not self.estimates:
             return self.odometry.distance_deviation
-        return float(self.estimates[-1].node_deviations[SCALE])
+        return float(self.estimates[-1].deviations[SCALE])
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Put the next scan into the log, and return what `solve` says of it.

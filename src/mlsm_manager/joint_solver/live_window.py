@@ -17,7 +17,7 @@ from mlsm_manager.joint_solver.comparisons import (
 from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.loops import Bend, add_loops
 from mlsm_manager.joint_solver.map_support import agreement
-from mlsm_manager.joint_solver.motion_models import frozen_deviations
+from mlsm_manager.joint_solver.motion_models import FIXED_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import (
     DELAY,
     POSE,
@@ -26,6 +26,7 @@ from mlsm_manager.joint_solver.normal_equations import (
     DenseSolution,
     Layout,
     NormalEquations,
+    prior_of,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
@@ -138,7 +139,7 @@ class LiveWindow:
         start: Optional[np.ndarray],
     ) -> None:
         self._run, self._log, self._state = solution, solution.log, solution.state
-        self._odometry, self._parameters = solution.odometry, solution.parameters
+        self._odometry, self._parameters = solution.parameters.odometry, solution.parameters
         last = self._log.scan_count
         self._scans_per_group, first = self._parameters.group_scans, max(0, last - self._parameters.free_nodes)
         self._recent = first // self._scans_per_group * self._scans_per_group
@@ -148,10 +149,11 @@ class LiveWindow:
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._recent_points = self._log.surfaces.heard(self._recent, last)
         self._starts, self._newest_start = self._layout.step_starts, self._layout.node_start(last)
-        self._believed_columns = self._layout.with_run(np.array([first]))[0]
         self._motion = self._log.node_motion(np.arange(first, last + 1))
-        self._beliefs = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
-        self._known = solution.known
+        self._mean, deviations = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
+        held = self._layout.size + len(self._held_covariance) + np.arange(-POSE_COLUMNS, 0) if first else ()
+        self._believed = prior_of(self._layout.with_run(np.array([first]))[0], self._mean, deviations, held)
+        self._known, self._are_apart = solution.known, solution.submaps.numbers.any()
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0
         self._lists: List[Neighbours] = []
@@ -215,14 +217,12 @@ class LiveWindow:
 
     def _expected(self) -> NormalEquations:
         """Return what is expected of the free unknowns without any echo."""
-        layout, (mean, deviations), held = self._layout, self._beliefs, ()
-        equations = NormalEquations(layout.size, len(self._held_covariance))
-        value = np.append(self._state.nodes[layout.first], self._state.run)
-        if layout.first:
-            mean = np.append(value[POSE], mean[POSE_COLUMNS:])
-            held = layout.size + len(self._held_covariance) - POSE_COLUMNS + np.arange(POSE_COLUMNS)
-        equations.add_prior(self._believed_columns, value, mean, deviations, held)
-        equations.add(*self._odometry.steps(self._starts, self._state.nodes[layout.first :], self._motion))
+        equations, first = NormalEquations(self._layout.size, len(self._held_covariance)), self._layout.first
+        off = np.append(self._state.nodes[first], self._state.run) - self._mean
+        if first:
+            off[POSE] = 0.0
+        steps = self._odometry.steps(self._starts, self._state.nodes[first:], self._motion)
+        equations.add(self._believed._replace(values=off), *steps)
         return equations
 
     def _beliefs_before(self, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
@@ -239,15 +239,15 @@ class LiveWindow:
         It is what was known when this node was the newest: the window's scans are not in that. Of unknowns with a
         mixture of priors it is what was known without that, which the newest node has.
         """
-        node, deviations, mixture = frozen.node.copy(), frozen.node_deviations, self._odometry.mixture
+        node, deviations, mixture = frozen.node.copy(), frozen.deviations, self._odometry.mixture
         if mixture is not None:
             known = mixture.without(frozen.prior_term, node, frozen.own_covariance)
             columns = list(mixture.columns)
             forgotten = mixture.walks**2 * float(self._motion.times[-1] - self._motion.times[0])
             node[columns], deviations[columns] = known.mean, np.sqrt(np.diag(known.covariance) + forgotten)
-        of_run = frozen.run_deviations
-        of_run[DELAY] *= _FORGOTTEN_DELAY
-        return np.append(node, frozen.run), np.append(frozen_deviations(deviations), of_run)
+        deviations[len(node) + DELAY] *= _FORGOTTEN_DELAY
+        deviations[POSE] = FIXED_DEVIATION
+        return np.append(node, frozen.run), deviations
 
     def _surfaces_met(self, cut: float) -> List[Comparison]:
         """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed.
@@ -264,7 +264,7 @@ class LiveWindow:
             to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])
             met.insert(1, (to_known, sources, known))
-        self._met = self._run.submaps.within(met)
+        self._met = self._run.submaps.within(met) if self._are_apart else met
         to_frozen, *others = self._met
         return [(weighted(to_frozen[0], self._frozen.importance), *to_frozen[1:]), *others]
 

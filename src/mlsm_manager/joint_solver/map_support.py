@@ -88,7 +88,7 @@ def misfit_variances(solution: Solution, first: int) -> np.ndarray:
     """
     parts = solution.parameters.parts_per_turn
     times = solution.log.node_times[parts * first :: parts]
-    if not np.isinf(solution.odometry.distance_deviation):
+    if not np.isinf(solution.parameters.odometry.distance_deviation):
         return np.zeros(len(times) - 1)
     shares = shares_heard_before(solution, first)
     misfit = np.clip(1.0 - np.where(np.isfinite(shares), shares, _FITS) / _FITS, 0.0, 1.0)

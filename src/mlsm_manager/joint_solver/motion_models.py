@@ -96,13 +96,6 @@ class OdometryModel(Protocol):
         return None
 
 
-def frozen_deviations(deviations: np.ndarray) -> np.ndarray:
-    """Return the deviations (width,) that hold a frozen node; `deviations` are those it was last known with."""
-    result = np.maximum(deviations, HELD_DEVIATION)
-    result[:3] = FIXED_DEVIATION
-    return result
-
-
 class Transition(NamedTuple):
     """matrix: (width, width) derivatives of the next node by this one. noise: (width, width) covariance."""
 

@@ -102,6 +102,16 @@ class Residuals(NamedTuple):
     weights: np.ndarray
 
 
+def prior_of(columns: np.ndarray, off: np.ndarray, deviation: np.ndarray, held: Sequence[int] = ()) -> Residuals:
+    """Return that unknowns in `columns` (m,) should not be `off` (m,) from their means but for `deviation` (m,).
+
+    held: columns of held unknowns with which the means of the first ones go.
+    """
+    pairs = np.full((len(off), 2), -1)
+    pairs[:, 0], pairs[: len(held), 1] = columns, held
+    return Residuals(pairs, np.tile([1.0, -1.0], (len(off), 1)), off, np.maximum(deviation, _HELD_DEVIATION) ** -2.0)
+
+
 class NormalEquations:
     """information @ step = -gradient of `size` free unknowns; after them come the columns of `held` ones."""
 
@@ -121,18 +131,6 @@ class NormalEquations:
                 columns, weighted[:, :, np.newaxis] * jacobian[:, np.newaxis], weighted * values[:, np.newaxis]
             )
             self.cost += float(np.sum(weights * values**2))
-
-    def add_prior(
-        self, columns: np.ndarray, value: np.ndarray, mean: np.ndarray, deviation: np.ndarray,
-        held: Sequence[int] = (),
-    ) -> None:  # fmt: skip
-        """Add that unknowns in `columns` (m,), at `value` (m,), are `mean` (m,) but for `deviation` (m,).
-
-        held: columns of held unknowns with which the means of the first ones go.
-        """
-        weight, pairs = np.maximum(deviation, _HELD_DEVIATION) ** -2.0, np.full((len(value), 2), -1)
-        pairs[:, 0], pairs[: len(held), 1] = columns, held
-        self.add(Residuals(pairs, np.tile([1.0, -1.0], (len(value), 1)), value - mean, weight))
 
     def add_terms(self, columns: np.ndarray, information: np.ndarray, gradient: np.ndarray) -> None:
         """Add m sums: columns (m, c) as those of Residuals, information (m, c, c), gradient (m, c)."""

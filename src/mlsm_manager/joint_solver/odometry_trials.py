@@ -32,7 +32,7 @@ class OdometryErrors:
 
 def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     """Return what the odometry of a run that is fitted was wrong by; None where its model cannot be freed."""
-    model = run.odometry.freed
+    model = run.parameters.odometry.freed
     if model is None:
         return None
     freed = replace(run, parameters=replace(run.parameters, odometry=model), state=_for_model(run.state, model))
@@ -79,7 +79,7 @@ def reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float
     first, last = np.searchsorted(log.node_times, stretch)
     for node in range(max(first, 1), min(last + 1, len(nodes))):
         motion = log.node_motion(np.array([node - 1, node]))
-        result[node, :YAW] = run.odometry.advanced(result[node - 1 : node], motion)[0, :YAW]
+        result[node, :YAW] = run.parameters.odometry.advanced(result[node - 1 : node], motion)[0, :YAW]
         result[node + 1 :, :YAW] = nodes[node + 1 :, :YAW] + result[node, :YAW] - nodes[node, :YAW]
     return result
 

@@ -166,7 +166,8 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     log, state, newest = solution.log, solution.state, solution.state.nodes[-1]
     last = log.scan_count
     nodes = np.array([last - 1, last])
-    step = Transition.of(solution.odometry, state.nodes[nodes], log.node_motion(nodes)).step_covariance(covariance)
+    transition = Transition.of(solution.parameters.odometry, state.nodes[nodes], log.node_motion(nodes))
+    step = transition.step_covariance(covariance)
     if _KNOWN * widest(step[:2, :2]) < solution.parameters.cut:
         return newest
     before, own = (
@@ -289,7 +290,7 @@ def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -
     own[POSE] = own[:, POSE] = 0.0
     for node in range(log.scan_count - 1 - silent, log.scan_count):
         motion = log.node_motion(np.array([node, node + 1]))
-        step = Transition.of(solution.odometry, nodes[node : node + 2], motion)
+        step = Transition.of(solution.parameters.odometry, nodes[node : node + 2], motion)
         own = step.matrix @ own @ step.matrix.T + step.noise
     return own
 

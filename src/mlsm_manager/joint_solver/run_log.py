@@ -15,6 +15,8 @@ _POINTS_OF_PLATEAU = 2.0  # per echo: plateaus have 3 to 4 at a spacing of 1 m, 
 
 
 _OF_POINTS = [field.name for field in fields(SurfacePoints)]
+_SCAN = [("odometry", int), ("points", int), ("echoes", float), ("forgotten", bool)]
+"""Of a scan: how many poses of the odometry there were before it, how many points and echoes it has; of its points."""
 
 
 class PointTable:
@@ -95,16 +97,14 @@ class RunLog:
         self.odometry = OdometryLog()
         self._node_times = GrowingArray()
         self.surfaces, self.posts = PointTable(), PointTable()
-        self._odometry_lengths: List[int] = []
-        self._forgotten = GrowingArray(kind=bool)
-        self._points_and_echoes = GrowingArray(2)
+        self._scans = GrowingArray(kind=_SCAN)
         self._count()
 
     @property
     def has_plateaus(self) -> bool:
         """Whether most echoes are so long that they are drawn as several points."""
-        points, echoes = self._points_and_echoes.values.sum(axis=0)
-        return bool(points > _POINTS_OF_PLATEAU * echoes)
+        scans = self._scans.values
+        return bool(scans["points"].sum() > _POINTS_OF_PLATEAU * scans["echoes"].sum())
 
     def take(self, scans: Sequence[Scan], parts: int, lookahead: float) -> None:
         """Append `scans`, each cut into `parts`, all or none; see `append`."""
@@ -131,11 +131,9 @@ class RunLog:
         if scan.reference_time <= newest:
             text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
             raise RefusedInput("scans out of order", text)
-        self._odometry_lengths.append(len(self.odometry))
-        self._forgotten.extend([False])
+        self._scans.extend(np.array([(len(self.odometry), len(scan.points), sights.echo_count, False)], _SCAN))
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
-        self._points_and_echoes.extend(np.array([[len(scan.points), sights.echo_count]]))
         self.surfaces.append(points)
         self.posts.append(posts)
         self._count()
@@ -143,16 +141,15 @@ class RunLog:
     def _count(self) -> None:
         """Learn how many scans there are now."""
         self.scan_count = self.surfaces.scan_count
-        self.node_times, self.forgotten = self._node_times.values, self._forgotten.values
+        self.node_times, self.forgotten = self._node_times.values, self._scans.values["forgotten"]
 
     def shorten(self, scans: int) -> None:
         """Keep the oldest `scans`, as if the others had not been."""
         if scans == self.scan_count:
             return
-        for table in (self.surfaces, self.posts, self._points_and_echoes, self._forgotten):
+        self.odometry.shorten(self._scans.values["odometry"][scans])
+        for table in (self.surfaces, self.posts, self._scans):
             table.shorten(scans)
-        self.odometry.shorten(self._odometry_lengths[scans])
-        del self._odometry_lengths[scans:]
         # Without scans no node is known: the next scan begins the run.
         self._node_times.shorten(scans + 1 if scans else 0)
         self._count()
@@ -167,8 +164,8 @@ class RunLog:
         """Keep only about one pose of the odometry in a second before `scan` began."""
         before = len(self.odometry)
         self.odometry.thin(self.node_times[scan])
-        gone = before - len(self.odometry)
-        self._odometry_lengths = [max(length - gone, 0) for length in self._odometry_lengths]
+        lengths = self._scans.values["odometry"]
+        lengths[:] = np.maximum(lengths - (before - len(self.odometry)), 0)
 
     def since(self, scan: int, odometry: Optional[OdometryLog] = None) -> "RunLog":
         """Return a log of `scan` and all later ones, the first of which is number 0 there. It shares the odometry.
@@ -179,8 +176,7 @@ class RunLog:
         later.odometry = odometry or self.odometry
         later._node_times.extend(self.node_times[scan:])
         later.surfaces, later.posts = self.surfaces.since(scan), self.posts.since(scan)
-        later._forgotten.extend(self.forgotten[scan:])
-        later._points_and_echoes.extend(self._points_and_echoes.values[scan:])
+        later._scans.extend(self._scans.values[scan:])
         later._count()
         return later
 

@@ -80,8 +80,6 @@ class Submaps:
         self, met: List[Tuple[Pairs, PlacedPoints, PlacedPoints]]
     ) -> List[Tuple[Pairs, PlacedPoints, PlacedPoints]]:
         """Return the comparisons of points of one submap; what was in the map before the run is of the map."""
-        if not any(self._numbers):
-            return met
         found = []
         for pairs, sources, targets in met:
             same = self._of(sources.scans[pairs.rows]) == self._of(targets.scans[pairs.neighbours])
@@ -171,11 +169,6 @@ class Solution:
     prior_term: Optional[PriorTerm] = None
     fixes: Fixes = field(default_factory=Fixes)
 
-    @property
-    def odometry(self) -> OdometryModel:
-        """The model of the vehicle's motion."""
-        return self.parameters.odometry
-
     def with_state(self, state: State) -> "Solution":
         """Return the run with other unknowns."""
         return replace(self, state=state)
@@ -202,7 +195,7 @@ class Solution:
         nodes = np.unique(np.concatenate([scans, scans + 1]))
         sights = times, np.searchsorted(nodes, scans), points.ranges, points.bearings
         around = times.min() - _HALF_SECOND, times.max() + _HALF_SECOND
-        legs, knots = _path(log.odometry, self.odometry, log.node_times[nodes], state.nodes[nodes], around)
+        legs, knots = _path(log.odometry, self.parameters.odometry, log.node_times[nodes], state.nodes[nodes], around)
         scale = float(state.run[RANGE_SCALE])
         found = placed_rows(sights, points.normals, log.sonar_in_base, scale, legs, knots, _HALF_SECOND)
         return PlacedPoints(
@@ -228,7 +221,7 @@ class Solution:
 
     def path(self, times: np.ndarray) -> np.ndarray:
         """Return T_map_base (m, 3) at `times` (m,) [s]."""
-        return solved_path(self.log.odometry, self.odometry, self.log.node_times, self.state.nodes, times)
+        return solved_path(self.log.odometry, self.parameters.odometry, self.log.node_times, self.state.nodes, times)
 
 
 def solved_path(

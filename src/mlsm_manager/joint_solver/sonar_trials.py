@@ -130,7 +130,7 @@ def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, BatchResult
     """
     log, nodes = fault.logged(run.log), run.state.nodes
     if fault.kind is SonarKind.RANGES:
-        alone = np.isinf(run.odometry.distance_deviation)
+        alone = np.isinf(run.parameters.odometry.distance_deviation)
         nodes = _longer(run, log, nodes, fault) if alone else reckoned(run, log, nodes, (fault.begin, np.inf))
     changed = replace(run, log=log, state=State(nodes.copy(), run.state.run.copy()))
     return changed, fit_of(changed)

@@ -106,12 +106,9 @@ class KeyframeMap:
         return carved
 
     def _carved(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
-        """As `carve` while only what is settled is in the map.
-
-        Nobody looks at the free space of a map whose moving keyframes are not followed.
-        """
+        """As `carve` while only what is settled is in the map."""
         report, noted = self._free.carve(self._map, points, times, origins)
-        if self._stretches is not None and noted is not None and self._free.follows:
+        if self._stretches is not None and noted is not None:
             self._stretches.note_free(noted)
         return report
 
@@ -135,7 +132,7 @@ class KeyframeMap:
         else:
             self._due, self._above = None, Blocks.none(self._map.resolution)
         carved = [report for report in carved if report is not None]
-        return sum(carved, CarveReport(0, 0, 0)) if carved else None
+        return sum(carved[1:], carved[0]) if carved else None
 
     def settle(self, placement: Placement, until: float = np.inf) -> None:
         """Draw all keyframes that end by `until` [s] for the last time, and forget those after it."""

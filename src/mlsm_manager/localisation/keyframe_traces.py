@@ -14,7 +14,7 @@ import numpy as np
 
 from mlsm_manager.localisation.clouds import Placement
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
-from mlsm_manager.surface_map.blocks import Blocks, cell_keys, cells_of_keys, keys_of
+from mlsm_manager.surface_map.blocks import Blocks, keys_of
 from mlsm_manager.surface_map.free_space import BeamFindings, Carver, CarveReport, FirstEchoes, pairs_of_groups
 from mlsm_manager.surface_map.insertion import blocks_of
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap, Overlay
@@ -76,21 +76,19 @@ class KeyframeCarving:
         """Take what was known to be free. Raises ValueError for another resolution."""
         self.settled.insert_blocks(free)
 
-    @property
-    def follows(self) -> bool:
-        """Whether the beams of keyframes that may still move are followed."""
-        return self._most_followed > 0
-
     def carve(
         self, surface_map: MultiLevelSurfaceMap, points: np.ndarray, times: np.ndarray, origins: np.ndarray
     ) -> Tuple[Optional[CarveReport], Optional[Blocks]]:
         """Carve for ever along the beams of points (n, 4) in the map, taken at `times` (n,) s from `origins` (n, 2) m.
 
-        Return a report and what was not known to be free; None of both where nothing is to be carved.
+        Return a report and what was not known to be free; None of both where nothing is to be carved. Nobody looks at
+        the free space of a map whose moving keyframes are not followed: what is known of it is not told.
         """
         if self._carver is None:
             return None, None
-        return self._carver.carve(surface_map, self.settled, FirstEchoes.of_level(points, times, origins), points)
+        beams = FirstEchoes.of_level(points, times, origins)
+        report, noted = self._carver.carve(surface_map, self.settled, beams, points)
+        return report, noted if self._most_followed else None
 
     def forget_oldest(self) -> None:
         """Forget what the oldest keyframe said, because it is settled."""
@@ -126,14 +124,14 @@ class KeyframeCarving:
         if not looks:
             return nothing
         crossed = Blocks.joined([findings.crossed for _, findings in looks])
-        keys = cell_keys(crossed.cells)
+        keys = crossed.keys
         beams = np.concatenate([findings.beams for _, findings in looks])
         number = np.repeat([number for number, _ in looks], [len(findings.beams) for _, findings in looks])
         counts = number > self._last_hit(keys)
         keys, crossed, beams = keys[counts], crossed.take(counts), beams[counts]
         order = np.argsort(keys, kind="stable")
         cells, starts = np.unique(keys[order], return_index=True)
-        blocks, rows, owners = surface_map.find(cells_of_keys(cells))
+        blocks, rows, owners = surface_map.find(cells)
         block, entry = pairs_of_groups(starts, len(keys), owners)
         entry = order[entry]
         same = blocks.take(block).gaps(crossed, entry) <= 0.0
@@ -190,7 +188,7 @@ class _Stretch:
 
     def without_what_is_gone(self, surface_map: MultiLevelSurfaceMap) -> "_Stretch":
         """Return it without blocks of which the map holds nothing any more, because beams went through them."""
-        there, _, owners = surface_map.find(self.drawn.cells)
+        there, _, owners = surface_map.find(self.drawn.keys)
         drawn, holds = self.drawn, np.zeros(len(self.drawn), dtype=bool)
         holds[owners[there.gaps(drawn, owners) <= 0.0]] = True
         return _Stretch(self.keyframes, self.time, self.pose, drawn.take(holds), self.free)

@@ -69,7 +69,7 @@ class MotionFindings:
     @property
     def is_alone(self) -> bool:
         """Whether a compass tells the motion alone."""
-        return bool(np.isinf(self.run.odometry.distance_deviation))
+        return bool(np.isinf(self.run.parameters.odometry.distance_deviation))
 
     def spread(self, times: np.ndarray) -> np.ndarray:
         """Return what these paths add to the covariances of the position at `times` (k,) [s], (k, 2, 2) m^2."""
@@ -112,7 +112,7 @@ class MotionFindings:
     @property
     def _direction(self) -> CourseFound:
         """By how much the sonar is turned if not the odometry is, whose direction of motion the run found."""
-        model = self.run.odometry
+        model = self.run.parameters.odometry
         if DIRECTION not in model.calibrated.values():
             return NOT_TOLD
         turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
@@ -293,7 +293,7 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
         return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
     track, run = fault.mended(found.track), found.run
     if fault.kind is FaultKind.STUCK:  # how the vehicle turned meanwhile the echoes tell
-        model = run.odometry.stuck(fault.begin, fault.end)
+        model = run.parameters.odometry.stuck(fault.begin, fault.end)
         run = replace(run, parameters=replace(run.parameters, odometry=model))
     span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
     turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)

@@ -97,6 +97,11 @@ class Blocks:
         return cells_of(self.mean, self.resolution)
 
     @property
+    def keys(self) -> np.ndarray:
+        """(n,) int64, the key of each block's cell."""
+        return keys_of(self.rows, self.resolution)
+
+    @property
     def centers(self) -> np.ndarray:
         """(n, 2) x y of each block's cell centre, m."""
         return (self.cells + 0.5) * self.resolution

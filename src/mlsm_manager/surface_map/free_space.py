@@ -206,14 +206,15 @@ class Carver:
         either that block or that echo is wrong. That block counts a crossing, unless the scan itself hit its cell.
         """
         paths = beam_paths(beams, self.beam_width, occupied.resolution)
-        hit = np.isin(cell_keys(paths.cells), keys_of(points, occupied.resolution))
-        blocks, rows, owners = occupied.find(paths.cells)
+        cells = cell_keys(paths.cells)
+        hit = np.isin(cells, keys_of(points, occupied.resolution))
+        blocks, rows, owners = occupied.find(cells)
         pair, block = self._meetings(paths, blocks, owners)
         first = np.full(len(beams.origins), np.inf)
         np.minimum.at(first, paths.beam[pair], paths.distance[pair])
         crossing = (paths.distance[pair] == first[paths.beam[pair]]) & ~hit[paths.cell[pair]]
         before = (paths.distance < first[paths.beam]) & ~hit[paths.cell]
-        number = np.bincount(block[crossing], minlength=len(blocks))
+        number = np.bincount(block[crossing], minlength=len(rows))
         crossed = np.flatnonzero(number)
         free = _free_blocks(paths.take(before), occupied.resolution)
         return BeamFindings(free, blocks.take(crossed), rows[crossed], number[crossed])
@@ -237,8 +238,8 @@ class Carver:
         """Return pairs (k,) of `paths` and blocks (k,) that lie in the way of their beams."""
         block, pair = pairs_of_groups(paths.starts, len(paths.cell), owners)
         half = np.maximum(paths.distance[pair] * np.tan(self.parameters.fan_core / 2.0), blocks.resolution / 2.0)
-        above = blocks.bottom[block] - paths.height[pair]
-        below = paths.height[pair] - blocks.height[block]
+        above = blocks.rows[block, BOTTOM] - paths.height[pair]
+        below = paths.height[pair] - blocks.rows[block, TOP]
         inside = np.maximum(above, below) <= half
         return pair[inside], block[inside]
 
@@ -248,8 +249,9 @@ def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> Blocks:
 
     Return these.
     """
-    there, _, owners = free.find(noted.cells)
-    known = np.zeros(len(noted), dtype=bool)
+    cells = noted.keys
+    there, _, owners = free.find(cells)
+    known = np.zeros(len(cells), dtype=bool)
     known[owners[(there.gaps(noted, owners) < free.resolution) & (there.count >= _ENOUGH)]] = True
     new = noted.take(~known)
     free.insert_blocks(new)

@@ -12,7 +12,7 @@ from typing import NamedTuple, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import NO_BLOCK, BlockStore, Runs
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys, keys_of
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, keys_of
 from node_support.numba_cache import compiled
 
 _VALUES = 4  # mean of x y z and strength, then as many sums of squares: the first columns of a row
@@ -63,7 +63,7 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
     """Insert blocks of the store's resolution, which may overlap; return the keys (c,) of their cells, sorted."""
     # Single precision would be compiled anew, for seconds, when the first loop closes.
     rows = blocks.rows.astype(np.float64, copy=False)
-    cells, order, starts = _sorted_by_cell(cell_keys(blocks.cells), rows[:, BOTTOM])
+    cells, order, starts = _sorted_by_cell(blocks.keys, rows[:, BOTTOM])
     owner = np.repeat(np.arange(len(cells)), np.diff(starts))
     _insert_groups(store, cells, Groups(rows[order], owner, blocks.crossed[order]))
     return cells

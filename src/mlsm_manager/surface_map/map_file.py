@@ -15,7 +15,7 @@ import numpy as np
 
 from georeferencing.origin import STORED, Origin
 from mlsm_manager.surface_map.array_file import ArrayFileError, decoded, encoded
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks, cell_keys
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, MEAN, ROW_WIDTH, SQUARES, TOP, Blocks
 from node_support.files import write_whole
 from node_support.marks import Mark
 
@@ -145,7 +145,7 @@ def _layer_words(blocks: Blocks) -> Dict[str, float]:
 
 
 def _columns(blocks: Blocks, greatest_deviation: float) -> Dict[str, np.ndarray]:
-    order = np.lexsort((blocks.bottom, cell_keys(blocks.cells)))
+    order = np.lexsort((blocks.bottom, blocks.keys))
     blocks = blocks.take(order)
     cells, depth = blocks.cells, blocks.depth
     within = blocks.mean[:, :2] / blocks.resolution - cells

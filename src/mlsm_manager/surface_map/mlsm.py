@@ -102,11 +102,11 @@ class MultiLevelSurfaceMap:
         return self._changed.take()
 
     def find(self, cells: np.ndarray) -> Tuple[Blocks, np.ndarray, np.ndarray]:
-        """Return the blocks (m) of cells (n, 2), the row of each (m,), and the index of its cell in `cells` (m,).
+        """Return the blocks (m) of cells with keys `cells` (n,), the row of each (m,), and whose it is, (m,) indices.
 
         The rows are good for `count_crossings` and `remove`, until points are inserted or blocks removed.
         """
-        rows, owners = self._store.find(cell_keys(cells))
+        rows, owners = self._store.find(cells)
         return self._store.blocks(rows), rows, owners
 
     def is_near(self, points: np.ndarray) -> np.ndarray:
@@ -185,7 +185,7 @@ class Covered:
 
     def uncover(self, surface_map: MultiLevelSurfaceMap) -> None:
         """Give these cells of a map what they held before."""
-        _, rows, _ = surface_map.find(self.cells)
+        _, rows, _ = surface_map.find(cell_keys(self.cells))
         surface_map.remove(rows)
         surface_map.insert_blocks(Blocks(self.rows, surface_map.resolution, self.crossed))
 
@@ -208,12 +208,12 @@ class Overlay:
 
     def lay(self, blocks: Blocks) -> None:
         """Insert blocks into the map."""
-        self._remember(blocks.cells)
+        self._remember(blocks.keys)
         self._map.insert_blocks(blocks)
 
     def hide(self, rows: np.ndarray) -> None:
         """Remove the blocks in `rows` (n,) of the map."""
-        self._remember(self._map.at(rows).cells)
+        self._remember(self._map.at(rows).keys)
         self._map.remove(rows)
 
     def take_off(self) -> None:
@@ -224,7 +224,7 @@ class Overlay:
         self._forget()
 
     def _remember(self, cells: np.ndarray) -> None:
-        new = np.setdiff1d(cell_keys(cells), self._cells)
-        held, _, _ = self._map.find(cells_of_keys(new))
+        new = np.setdiff1d(cells, self._cells)
+        held, _, _ = self._map.find(new)
         self._cells = np.union1d(self._cells, new)
         self._held = Blocks.joined([self._held, held])

@@ -121,7 +121,7 @@ def difference(first: Blocks, second: Blocks) -> Difference:
 
 def _holders(surface_map: MultiLevelSurfaceMap, parts: Blocks) -> np.ndarray:
     """Return the row (n,) of the map's block that each of `parts` (n) is part of."""
-    blocks, rows, owners = surface_map.find(parts.cells)
+    blocks, rows, owners = surface_map.find(parts.keys)
     holds = (blocks.bottom <= parts.bottom[owners]) & (parts.bottom[owners] <= blocks.height)
     holders = np.empty(len(parts), dtype=np.int64)
     holders[owners[holds]] = rows[holds]

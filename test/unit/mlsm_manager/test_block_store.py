@@ -80,9 +80,9 @@ def map_of(seed, count=60):
 def changed(surface_map, rng):
     """Insert points into old blocks and new cells, take blocks away, and count crossings."""
     surface_map.insert(rng.uniform(-5.0, 5.0, (20, 4)))
-    _, rows, _ = surface_map.find(surface_map.blocks.cells[:5])
+    _, rows, _ = surface_map.find(surface_map.blocks.keys[:5])
     surface_map.remove(np.unique(rows))
-    _, rows, _ = surface_map.find(surface_map.blocks.cells[-5:])
+    _, rows, _ = surface_map.find(surface_map.blocks.keys[-5:])
     rows = np.unique(rows)
     surface_map.count_crossings(rows, np.ones(len(rows), dtype=np.uint16))
 

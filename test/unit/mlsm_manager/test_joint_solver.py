@@ -80,7 +80,7 @@ def test_told_deviations_cover_the_errors_and_are_not_idle(made, live, ends, pat
 def test_the_frozen_map_s_own_error_counts_in_the_place_and_in_the_calibration(made):
     newest = followed(made.scans, replace(DEFAULTS, free_scans=6)).estimates[-1]
     assert np.trace(newest.covariance[:2, :2]) > np.trace(newest.own_covariance[:2, :2])
-    assert (newest.run_deviations > 1.001 * np.sqrt(np.diag(newest.own_covariance)[-2:])).all()
+    assert (newest.deviations[-2:] > 1.001 * np.sqrt(np.diag(newest.own_covariance)[-2:])).all()
 
 
 def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(made):

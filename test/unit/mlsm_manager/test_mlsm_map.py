@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from made_maps import in_order, map_with, partition, random_map
 
 from mlsm_manager.surface_map import block_store, insertion
-from mlsm_manager.surface_map.blocks import Blocks, cells_of
+from mlsm_manager.surface_map.blocks import Blocks, cell_keys, cells_of
 from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
@@ -125,7 +125,7 @@ def test_no_loop_is_compiled_after_the_map_was_made(dtype, writeable):
     points.setflags(write=writeable)
     surface_map.insert(points)
     surface_map.insert_blocks(surface_map.blocks)
-    surface_map.remove(surface_map.find(surface_map.blocks.cells)[1])
+    surface_map.remove(surface_map.find(surface_map.blocks.keys)[1])
     assert len(loops) >= 3
     assert [len(loop.signatures) for loop in loops] == compiled
 
@@ -141,7 +141,7 @@ def test_inserted_blocks_keep_their_crossings_and_end_those_of_what_they_meet():
     surface_map, other = MultiLevelSurfaceMap(0.5), MultiLevelSurfaceMap(0.5)
     for one, place, crossings in ((surface_map, 0.1, 9), (other, 0.1, 3), (other, 5.1, 4)):
         one.insert(np.array([[place, 0.1, 0.0, 1.0]]))
-        _, rows, _ = one.find(np.array([[int(place / 0.5), 0]]))
+        _, rows, _ = one.find(cell_keys(np.array([[int(place / 0.5), 0]])))
         one.count_crossings(rows, np.array([crossings]))
     surface_map.insert_blocks(other.blocks)
     assert surface_map.blocks.crossed.tolist() == [3, 4]

@@ -10,7 +10,7 @@ from made_models import COMPASS, errors_of, followed
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.estimate import scale_covariance
-from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, Residuals, solution_of
+from mlsm_manager.joint_solver.normal_equations import YAW, Layout, NormalEquations, Residuals, prior_of, solution_of
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.velocity_models import by_heading
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -246,7 +246,7 @@ def test_a_compass_that_errs_by_the_heading_is_an_unknown_that_is_eliminated():
         equations.add(Residuals(start, first, np.zeros(1), np.array([COMPASS.heading_deviation**-2.0])))
         unknowns = np.arange(layout.size + count)
         told = np.where(unknowns < layout.size, 0.03, 1.0)  # by the echoes, and of errors of one beforehand
-        equations.add_prior(unknowns, np.zeros(len(unknowns)), np.zeros(len(unknowns)), told)
+        equations.add(prior_of(unknowns, np.zeros(len(unknowns)), told))
     found = by_heading(COMPASS, layout, yaws, times, solution_of(without).solve)
     covariance = np.linalg.inv(with_errors.dense()[0])[: layout.size, : layout.size]
     np.testing.assert_allclose(np.linalg.inv(without.dense()[0]) + found @ found.T, covariance, atol=1e-9)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from mlsm_manager.joint_solver.normal_equations import NormalEquations, Residuals
+from mlsm_manager.joint_solver.normal_equations import NormalEquations, Residuals, prior_of
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian, PriorComponent, PriorMixture, PriorTerm
 
 NARROW, WIDE, SHARE = 0.01, 0.3, 0.8
@@ -92,7 +92,7 @@ def test_step_by_step_the_prior_becomes_that_of_the_component_that_holds(truth):
     prior, node, covariance = AdaptedPrior(MIXTURE, None), np.zeros(2), np.eye(2)
     for _ in range(5):
         equations = NormalEquations(2)
-        equations.add_prior(np.arange(2), node, np.array([0.0, 0.0]), np.array([1.0, WIDE]))
+        equations.add(prior_of(np.arange(2), node, np.array([1.0, WIDE])))
         equations.add(Residuals(np.array([[1]]), np.ones((1, 1)), node[1:] - truth, np.array([0.04**-2])))
         prior.add(equations, 0, node, lambda columns, found=covariance: found[np.ix_(columns, columns)])
         information, _ = equations.dense()
