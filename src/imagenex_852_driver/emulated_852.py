@@ -73,25 +73,21 @@ class HeadRotation:
         if not low <= self.position <= low + width:
             self._approach(low, low + width, size)
         elif width == _TURN:
-            self._go_round(low, size)
+            self.position = low + (self.position - low + (size if self.clockwise else -size)) % _TURN
         else:
             self._go_to_and_fro(low, low + width, size)
 
     def _approach(self, low: int, high: int, size: int) -> None:
         self.clockwise = self.position < low
-        target = low if self.clockwise else high
-        distance = min(size, abs(target - self.position))
-        self.position += distance if self.clockwise else -distance
-
-    def _go_round(self, low: int, size: int) -> None:
-        self.position = low + (self.position - low + (size if self.clockwise else -size)) % _TURN
+        self._go_to(low if self.clockwise else high, size)
 
     def _go_to_and_fro(self, low: int, high: int, size: int) -> None:
-        limit = high if self.clockwise else low
-        if self.position == limit:
+        if self.position == (high if self.clockwise else low):
             self.clockwise = not self.clockwise
-            limit = high if self.clockwise else low
-        distance = min(size, abs(limit - self.position))
+        self._go_to(high if self.clockwise else low, size)
+
+    def _go_to(self, target: int, size: int) -> None:
+        distance = min(size, abs(target - self.position))
         self.position += distance if self.clockwise else -distance
 
 

@@ -154,7 +154,7 @@ class AutopilotLinkNode:
             # Where MAVROS runs, pymavlink may be missing.
             from autopilot_link.link import AutopilotLink
 
-            return AutopilotLink(parameters, self.health, _now_ns, take)
+            return AutopilotLink(parameters, self.health, lambda: rospy.get_rostime().to_nsec(), take)
         except (ImportError, PortRefusedError) as error:
             raise StartError(str(error)) from error
 
@@ -226,7 +226,3 @@ class AutopilotLinkNode:
             self.health.show("sent now", self._obstacle() or "yes")
         self.health.show("connection", self._output.name)
         self.health.total("jumps told by reset_counter", self._corrections.jumps)
-
-
-def _now_ns() -> int:
-    return rospy.get_rostime().to_nsec()

@@ -1,6 +1,6 @@
 """Motion models of odometries that report positions: of a DVL, of the thrusters' commands, or of either."""
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, replace
 from operator import attrgetter
 from typing import Dict, Iterator, List, NamedTuple
 
@@ -79,9 +79,8 @@ class DvlFactors(OdometryModel):
 
     @property
     def freed(self) -> "ThrusterFactors":
-        own = {field.name: getattr(self._parameters, field.name) for field in fields(DvlOdometry)}
         still = {"scale_walk": 0.0, "current_deviation": HELD_DEVIATION, "current_walk": 0.0}
-        return ThrusterFactors(ThrusterOdometry(**own, **still)).freed
+        return ThrusterFactors(ThrusterOdometry(**vars(self._parameters), **still)).freed
 
     @property
     def calibrated(self) -> Dict[str, int]:
@@ -201,8 +200,7 @@ class UnsureFactors(ThrusterFactors):
     """
 
     def __init__(self, dvl: DvlOdometry, doubt: OdometryDoubt) -> None:
-        own = {field.name: getattr(dvl, field.name) for field in fields(DvlOdometry)}
-        own["scale_deviation"] = doubt.scale_deviation
+        own = {**vars(dvl), "scale_deviation": doubt.scale_deviation}
         super().__init__(
             ThrusterOdometry(**own, scale_walk=0.0, current_deviation=doubt.current_deviation, current_walk=0.0)
         )

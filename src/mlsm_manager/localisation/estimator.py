@@ -13,7 +13,7 @@ from mlsm_manager.localisation.clouds import CorrectionHistory
 from mlsm_manager.localisation.keyframe_map import KeyframeMaps, MapSettings
 from mlsm_manager.localisation.keyframe_traces import KeyframeCarving
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
+from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
 from mlsm_manager.scan_matching.scan import MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
@@ -162,9 +162,10 @@ class Estimator(ABC):
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Take a match that was made elsewhere as the pose of a scan."""
 
-    @abstractmethod
     def follow(self, track: Track, time: float) -> None:
         """Bring the belief to a later `time` [s] by the odometry alone, after a long time without scans."""
+        if self.belief is not None and time > self.belief.time:
+            self.belief = predicted(self.belief, track, time, self.errors)
 
     def add_points(self, points: np.ndarray) -> CloudUpdate:
         """Insert points (n, 4) that are in map already into the map that is shown."""

@@ -188,12 +188,10 @@ class Joint(Estimator):
         return ScanUpdate(scan, result, True, self.belief, forgotten=0 if session is None else session.turns_apart)
 
     def follow(self, track: Track, time: float) -> None:
-        """Bring what is known to a later `time` by the odometry, where no scan did so for long."""
-        if self.belief is None or time <= self.belief.time:
-            return
-        if self._session is not None:
+        """Bring what is known to a later `time` by the odometry; see Estimator.follow."""
+        if self._session is not None and time > self.belief.time:
             self._session.follow(track, time)
-        self.belief = predicted(self.belief, track, time, self.errors)
+        super().follow(track, time)
 
     @property
     def _known_until(self) -> float:

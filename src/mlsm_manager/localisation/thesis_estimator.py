@@ -8,7 +8,7 @@ from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.scan import MapCloud, MatchResult, Scan, Track, corrected_points
+from mlsm_manager.scan_matching.scan import MapCloud, MatchResult, Scan, corrected_points
 from mlsm_manager.scan_matching.scan_path import ERRORS
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer
@@ -48,11 +48,6 @@ class ThesisEstimator(Estimator):
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
         self._insert_matched(corrected_points(scan, result), scan.times)
         return ScanUpdate(scan, result, True, self.belief)
-
-    def follow(self, track: Track, time: float) -> None:
-        """Predict the belief at a later `time` by the odometry, after a long time without scans."""
-        if self.belief is not None and time > self.belief.time:
-            self.belief = predicted(self.belief, track, time, self.errors)
 
     @property
     def _known_until(self) -> float:

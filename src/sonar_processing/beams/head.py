@@ -151,7 +151,7 @@ class HeadWatch:
         if self._step == 0.0:
             self._step = step
         if _are_equal(step, self._step):
-            events[HeadEvent.LOST] += sum(_lost(one, self._step) for one in self._unusual)
+            events[HeadEvent.LOST] += sum(max(round(one / self._step) - 1, 0) for one in self._unusual)
             self._unusual.clear()
             return
         self._unusual.append(step)
@@ -163,7 +163,3 @@ class HeadWatch:
 
 def _are_equal(step: float, other: float) -> bool:
     return abs(step - other) <= _EQUAL * max(step, other)
-
-
-def _lost(step: float, usual: float) -> int:
-    return max(round(step / usual) - 1, 0)

@@ -74,9 +74,8 @@ class ScanAssembler:
             full = len(self._newest) == self.parameters.scan_size
             return self._cloud(list(self._newest), placed.beam) if full else None
         self._beams.append(placed)
-        if finished is None and self._is_complete():
-            finished = self._finish()
-        return finished
+        is_complete = len(self._beams) >= self.parameters.scan_size or (self._ends_at_turn and self._turn.is_full)
+        return self._finish() if finished is None and is_complete else finished
 
     def _begins_a_scan(self, beam: Beam) -> bool:
         if self._last is None:
@@ -86,9 +85,6 @@ class ScanAssembler:
     @property
     def _ends_at_turn(self) -> bool:
         return self.parameters.end_at_full_turn and not self.parameters.mode.is_continuous
-
-    def _is_complete(self) -> bool:
-        return len(self._beams) >= self.parameters.scan_size or (self._ends_at_turn and self._turn.is_full)
 
     def _finish(self) -> Optional[Cloud]:
         beams, last = list(self._beams), self._last
