@@ -152,7 +152,8 @@ class LiveWindow:
         self._motion = self._log.node_motion(np.arange(first, last + 1))
         self._mean, deviations = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
         held = self._layout.size + len(self._held_covariance) + np.arange(-POSE_COLUMNS, 0) if first else ()
-        self._believed = prior_of(self._layout.with_run(np.array([first]))[0], self._mean, deviations, held)
+        columns = self._layout.with_run(np.array([first]))[0]
+        self._believed = prior_of(columns, np.zeros(len(columns)), deviations, held)
         self._known, self._are_apart = solution.known, solution.submaps.numbers.any()
         self._solution: Optional[DenseSolution] = None
         self._comparisons = 0

@@ -1,7 +1,7 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
 from dataclasses import dataclass, field
-from typing import List, Tuple, Union
+from typing import Any, List, Tuple, Union
 
 import numpy as np
 
@@ -15,12 +15,12 @@ _WINDOW = 1.0  # s: longer than the odometry's period, short against a turn
 
 
 class GrowingArray:
-    """Rows of one shape, appended at constant cost per row.
+    """Rows of one shape and `kind`, numpy's, appended at constant cost per row.
 
     values: (n, ...) view of those that were appended, valid until the next change.
     """
 
-    def __init__(self, *shape: int, kind: type = float) -> None:
+    def __init__(self, *shape: int, kind: Any = float) -> None:
         self._rows = np.empty((_FIRST_CAPACITY, *shape), dtype=kind)
         self.values = self._rows[:0]
 

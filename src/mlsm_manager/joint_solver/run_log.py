@@ -16,7 +16,7 @@ _POINTS_OF_PLATEAU = 2.0  # per echo: plateaus have 3 to 4 at a spacing of 1 m, 
 
 _OF_POINTS = [field.name for field in fields(SurfacePoints)]
 _SCAN = [("odometry", int), ("points", int), ("echoes", float), ("forgotten", bool)]
-"""Of a scan: how many poses of the odometry there were before it, how many points and echoes it has; of its points."""
+"""Of a scan: number of poses of the odometry before it, its points and echoes, and whether its points are forgotten."""
 
 
 class PointTable:
