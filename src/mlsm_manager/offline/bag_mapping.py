@@ -25,6 +25,7 @@ from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
 from mlsm_manager.offline.sessions import Session, executor_for, prepared
 from mlsm_manager.offline.suited_parameters import (
     OdometryFound,
+    goes_astray,
     goes_on_better,
     may_strafe,
     odometry_of,
@@ -34,7 +35,16 @@ from mlsm_manager.offline.suited_parameters import (
 from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
-from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault, of_steps, of_stuck, ranked
+from mlsm_manager.self_check.causes import (
+    CERTAIN,
+    NOTHING_ASSUMED,
+    Assumption,
+    Cause,
+    Fault,
+    of_steps,
+    of_stuck,
+    ranked,
+)
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
@@ -147,7 +157,7 @@ def _judged(
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     findings, known = None, parameters
     if replayed.solver is not None:
-        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, heard.mounted))
+        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, heard.mounted, refined))
         known = findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
@@ -170,7 +180,8 @@ def _followed(
 ) -> Tuple[OdometryFound, ReplayParameters, Replayed]:
     """Return how the vehicle knows its motion, the parameters that suit that, and the replay with them.
 
-    Where scans do not go on by a compass alone, a vehicle that strafes is tried too, unless the odometry is named.
+    Where scans do not go on by a compass alone, or are too few to tell, a vehicle that strafes is tried too, unless the
+    odometry is named.
     """
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
     replayed = _replayed(recording, scans, parameters)
@@ -196,7 +207,7 @@ def _positions_mislead(
     No where somebody named the odometry.
     """
     asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and len(believed) > 0
-    if not asked or not all(map(may_strafe, believed)):
+    if not asked or not all(map(goes_astray, believed)):
         return False
     alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
     return goes_on_better(believed[-1], alone.solver.solution)
@@ -255,11 +266,15 @@ def _heard(
     return _Heard(mirrored, _scans(mirrored, extractor, options), mended, signs, [_OVER])
 
 
-def _assumed(odometry: OdometryFound, mended: Sequence[Cause]) -> Assumption:
-    """Return what no check tells of: of the odometry, or that the mount was put right by the echoes, if it was."""
-    if odometry.assumed.text or not mended:
+def _assumed(odometry: OdometryFound, mended: Sequence[Cause], refined: Optional[Refined]) -> Assumption:
+    """Return what no check tells of: of the odometry or of the mount, which may have been put right by the echoes."""
+    if odometry.assumed.text:
         return odometry.assumed
-    return Assumption("the mount is as the echoes tell it, to some degrees; correct tf and map again", 0.0)
+    if mended:
+        return Assumption("the mount is as the echoes tell it, to some degrees; correct tf and map again", 0.0)
+    if odometry.kind is OdometryKind.HOVERING and not (refined is not None and refined.motion.is_course_told):
+        return Assumption("the sonar is turned as tf says, which nothing tells of a vehicle that strafes", 0.0)
+    return NOTHING_ASSUMED
 
 
 def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:

@@ -11,7 +11,8 @@ from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import ReportedMotion, Scan
 from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption
-from mlsm_manager.self_check.map_checks import go_astray
+from mlsm_manager.self_check.map_checks import scans_go_on
+from mlsm_manager.self_check.verdict import Answer
 from recordings.motion.sweep_shifts import SweepMotion, SweepShifts, sweep_shifts
 
 _CELLS = 40
@@ -123,8 +124,17 @@ def with_cells(parameters: ReplayParameters, scans: Sequence[Scan], fixed: Colle
 
 
 def may_strafe(ahead: Solution) -> bool:
-    """Return whether scans do not go on in a run that is solved as if the vehicle goes ahead, or as reported."""
-    return go_astray(ahead.log.node_times[1:], shares_heard_before(ahead, 0), _WORTH_TRYING)
+    """Return whether scans do not go on in a run that is solved as if the vehicle goes ahead, or too few tell it."""
+    return _goes_on(ahead) is not Answer.FINE
+
+
+def goes_astray(believed: Solution) -> bool:
+    """Return whether scans do not go on in a run that is solved as if the vehicle goes as reported."""
+    return _goes_on(believed) is Answer.DOUBTFUL
+
+
+def _goes_on(run: Solution) -> Answer:
+    return scans_go_on(run.log.node_times[1:], shares_heard_before(run, 0), _WORTH_TRYING).answer
 
 
 def _length(run: Solution) -> float:
@@ -137,4 +147,4 @@ def goes_on_better(believed: Solution, alone: Solution) -> bool:
     shares, others = (shares_heard_before(run, 0) for run in (alone, believed))
     gain = float(np.nanmean(shares) - np.nanmean(others))
     needed = _SHORTER if _length(alone) < _length(believed) else _CLEARLY
-    return gain > needed and not go_astray(alone.log.node_times[1:], shares)
+    return gain > needed and not scans_go_on(alone.log.node_times[1:], shares).fires

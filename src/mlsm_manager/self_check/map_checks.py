@@ -7,8 +7,6 @@ import numpy as np
 from mlsm_manager.self_check.verdict import Verdict, merged, moment, percent
 
 _WINDOW = 20  # scans in which some may lie beside the others
-_FEWEST = 8  # scans, about two minutes: of those that strafe most do not go on, of others hardly one
-_GO_ON = 0.65
 _MAY_BE_BESIDE = 0.2  # share of these: a vehicle that comes around a corner hears new water
 AGREES = 0.5
 """Share of a scan's points on known surfaces from which on the scan agrees: the larger part."""
@@ -32,7 +30,7 @@ def in_submaps(times: np.ndarray, apart: np.ndarray) -> Tuple[Verdict, ...]:
     return (Verdict("submaps", float(1.0 - apart.mean()), 1.0, text, True, doubtful, question),)
 
 
-def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = _GO_ON, fewest: int = _WINDOW) -> Verdict:
+def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = 0.65) -> Verdict:
     """Return the least, over windows of 20 scans, of the share that four of five of them have at least.
 
     A solver that knows no velocity can hold on to a wrong place: where a scan does not fit, few of its points are
@@ -42,15 +40,13 @@ def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = _GO_ON, fe
     scan that does not tell.
     limit: on simulated tours and twins of a marina, paths that were right had 0.70 and more, those that were wrong by
     more than 10 m had 0.60 and less.
-    fewest: scans that tell, from which on there is a verdict; where they are fewer than 20, they are one window.
     """
     known = np.isfinite(shares)
     times, shares = np.asarray(times)[known], np.asarray(shares)[known]
     name, question = "scans go on", "Do scans lie on what was heard just before them, so that the motion is as assumed?"
-    if len(shares) < fewest:
-        return Verdict(name, np.nan, limit, f"fewer than {fewest} scans that others precede", True, question=question)
-    window = min(_WINDOW, len(shares))
-    windows = np.arange(len(shares) - window + 1)[:, np.newaxis] + np.arange(window)
+    if len(shares) < _WINDOW:
+        return Verdict(name, np.nan, limit, f"fewer than {_WINDOW} scans that others precede", True, question=question)
+    windows = np.arange(len(shares) - _WINDOW + 1)[:, np.newaxis] + np.arange(_WINDOW)
     values = np.quantile(shares[windows], _MAY_BE_BESIDE, axis=1)
     lowest, starts = float(values.min()), times[: len(values)][values < limit]
     figures = f"{percent(lowest)} of the echoes on earlier surfaces, at least {percent(limit)} needed"
@@ -58,13 +54,8 @@ def scans_go_on(times: np.ndarray, shares: np.ndarray, limit: float = _GO_ON, fe
     if len(starts):
         text = "scans do not fit those before them; a vehicle with a compass that moves sideways needs "
         text += f"--odometry hovering (only {figures})"
-    doubtful = merged(starts, float(np.median(np.diff(times))) * (window - 1))
+    doubtful = merged(starts, float(np.median(np.diff(times))) * (_WINDOW - 1))
     return Verdict(name, lowest, limit, text, True, doubtful, question)
-
-
-def go_astray(times: np.ndarray, shares: np.ndarray, limit: float = _GO_ON) -> bool:
-    """Return whether scans do not go on, as `scans_go_on`, also in a run that is too short for a verdict."""
-    return scans_go_on(times, shares, limit, _FEWEST).fires
 
 
 def recent_agreement(times: np.ndarray, agreements: np.ndarray, scans: int = 20, limit: float = 0.5) -> Verdict:

@@ -26,7 +26,8 @@ from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, is
 from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
-from mlsm_manager.self_check.map_checks import go_astray
+from mlsm_manager.self_check.map_checks import scans_go_on
+from mlsm_manager.self_check.verdict import Answer
 from node_support.geometry import move_of, rotated, transformed
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
@@ -57,6 +58,7 @@ class MotionFindings:
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
     nodes. mounts: rad, deviation of the direction in which sonar and odometry are mounted, where nothing tells it.
+    is_course_told: whether the vehicle has a usual course, which then tells a turn of the sonar.
     """
 
     run: Solution
@@ -65,6 +67,7 @@ class MotionFindings:
     causes: List[Cause] = field(default_factory=list)
     apart: List[np.ndarray] = field(default_factory=list)
     mounts: float = 0.0
+    is_course_told: bool = False
 
     @property
     def is_alone(self) -> bool:
@@ -91,7 +94,8 @@ class MotionFindings:
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), turn)) - gone
         causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
-        return replace(self, causes=causes, apart=[*self.apart, aside, self._late(places)], mounts=mounts)
+        apart = [*self.apart, aside, self._late(places)]
+        return replace(self, causes=causes, apart=apart, mounts=mounts, is_course_told=course.is_told)
 
     def _late(self, places: np.ndarray) -> np.ndarray:
         """Return how far nodes at `places` (n, 2) [m] lie beside where they are by the sonar's clock, (n, 2) m.
@@ -246,14 +250,17 @@ def _other_ranges(found: MotionFindings) -> List[_Trial]:
 
 
 def goes_on_with_other_ranges(run: Solution, track: Track) -> bool:
-    """Return whether scans of a run of a vehicle that goes ahead go on once a change of its ranges is taken out."""
+    """Return whether scans of a run of a vehicle that goes ahead go on once a change of its ranges is taken out.
+
+    No where scans are too few to tell it.
+    """
     fit = fit_of(run)
     trials = _other_ranges(MotionFindings(replace(run, state=fit.state), fit, track))
     best = max(trials, key=_gain, default=None)
     if best is None or best.gain < _NATS_ALONE:
         return False
     shares = shares_heard_before(replace(best.run, state=best.fit.state), 0)
-    return not go_astray(run.log.node_times[1:], shares, _GO_ON)
+    return scans_go_on(run.log.node_times[1:], shares, _GO_ON).answer is Answer.FINE
 
 
 def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:

@@ -149,7 +149,7 @@ def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path
     reduce_bag(BASIN, bag, odom_frame="odom", base_frame="base_link")
     done = run(bag, "--out", folder)
     assert done.returncode == 0, done.stderr
-    assert "odometry: heading, because the position never changes, the heading by" in done.stdout
+    assert "odometry: hovering, because the position never changes, the heading by" in done.stdout
     trajectory = np.genfromtxt(folder / "trajectory.csv", delimiter=",", names=True)
     assert np.ptp(trajectory["odometry_x"]) == 0.0
     assert np.ptp(trajectory["corrected_x"]) > 1.0
