@@ -30,6 +30,7 @@ FEWEST_BEAMS = 6  # Fewer directions tell no quantile over them
 _SMALLEST_SIGMA_BINS = 0.5  # Bins: a narrower Gaussian is no longer one when it is sampled
 _SPREAD = 0.1  # Share of the directions: next to the quantile, so that walls do not count as spread
 _SPREAD_SIGMAS = 4.0  # The spread is smoothed over the width of a filtered echo, both of its tails included
+_HEARD = 0.5  # Strength from which on there is a background: tails of echoes through the filter are below
 _DULL = 0.1  # Share of the background in loud directions: the hull hides those with less
 _BACKGROUND = 0.75  # Quantile along a beam: a wall at a quarter of the range may hide what is behind it
 _LOUD = 0.9  # Quantile over the directions that is loud: the hull hides less than nine tenths of a circle
@@ -160,8 +161,9 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
 def _hearing(smooth: np.ndarray) -> np.ndarray:
     """Return the beams (k, bins) that hear a background; all of them in a scan without one, or where too few do."""
     background = np.quantile(smooth, _BACKGROUND, axis=1)
-    hearing = background >= _DULL * np.quantile(background, _LOUD)
-    return smooth[hearing] if np.count_nonzero(hearing) >= FEWEST_BEAMS else smooth
+    loud = np.quantile(background, _LOUD)
+    hearing = background >= _DULL * loud
+    return smooth[hearing] if loud >= _HEARD and np.count_nonzero(hearing) >= FEWEST_BEAMS else smooth
 
 
 def _bins_above(width: float) -> int:
