@@ -10,11 +10,15 @@ from mlsm_manager.self_check.causes import CERTAIN, Cause
 from sonar_processing.beams.beam import PlacedBeam
 
 _SECTORS, _CELL = 36, 0.2  # of the circle; m, of the range
+_SECTOR = 2.0 * np.pi / _SECTORS
 _MOSTLY = 0.8  # share of a sector's beams that hear it at one range, while the vehicle moves and all else does
 _NARROWEST = 2  # sectors
 _WIDEST = 2.0 / 3.0  # of those looked at: a ring all around is the floor or the pulse, which echo_extractor removes
+_LONG = 1.2  # m: from where a wall is nearest to where it is no longer heard at that range, an echo's length and a cell
 _FEWEST = 10  # beams of a sector
 _MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
+_LEAVES = np.array([5.0, np.pi / 2.0])  # m across its way, or rad: a vehicle that goes or turns less may follow a wall
+_MIDDLE = [(1.0 - _MOSTLY) / 2.0, (1.0 + _MOSTLY) / 2.0]  # quantiles over the time, as a wall need not be heard always
 _LEFT = 0.5  # m: by which what is hidden behind it may matter
 
 
@@ -26,7 +30,7 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     angles = np.array([one.beam.angle for one in beams])
     sectors = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
     goes_along = _heard_always(beams, sectors)
-    if goes_along is None:
+    if goes_along is None or (_may_be_wall(goes_along) and (_leaves(track) < _LEAVES).all()):
         return list(beams), []
     near = goes_along | np.roll(goes_along, 1, axis=0) | np.roll(goes_along, -1, axis=0)
     near[:, 1:] |= near[:, :-1].copy()
@@ -35,6 +39,24 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     text = f"something {metres:.1f} m away goes along with the vehicle, in {width} deg of the circle"
     left = [_without(one, near[sector]) for one, sector in zip(beams, sectors)]
     return left, [Cause(text, CERTAIN, is_mended=True, metres=_LEFT)]
+
+
+def _may_be_wall(goes_along: np.ndarray) -> bool:
+    """Return whether no range is heard in more of the cells (sectors, cells) than that of a wall beside the vehicle."""
+    nearest = _CELL * np.arange(goes_along.shape[1])
+    widest = 2.0 * np.arccos(nearest / (nearest + _LONG)) + 2.0 * _SECTOR
+    return bool((goes_along.sum(axis=0) * _SECTOR <= widest).all())
+
+
+def _leaves(track: Track) -> np.ndarray:
+    """Return how far a vehicle went across its main direction [m], and by how much it turned [rad], most of the time.
+
+    A vehicle that follows a wall may hear it at one range all the way.
+    """
+    places = track.poses[:, :2] - track.poses[:, :2].mean(axis=0)
+    across = np.linalg.svd(places.T @ places)[0][:, -1]
+    spread = np.quantile(np.column_stack([places @ across, np.unwrap(track.poses[:, 2])]), _MIDDLE, axis=0)
+    return spread[1] - spread[0]
 
 
 def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[np.ndarray]:

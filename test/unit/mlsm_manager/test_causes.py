@@ -25,6 +25,7 @@ from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
+from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 pytestmark = pytest.mark.long
@@ -57,6 +58,19 @@ def test_what_goes_along_with_the_vehicle_is_left_out():
     ]
     assert not any(one.beam.intensities[round(5.0 / one.beam.range_resolution) + 1] for one in beams[:3])
     assert without_companions(WHOLE.beams, WHOLE.track) == (WHOLE.beams, [])
+
+
+def test_a_wall_that_the_vehicle_follows_does_not_go_along():
+    angles = np.radians(np.arange(0.0, 3600.0, 3.0))
+    ranges = 4.0 / np.maximum(np.sin(angles), 0.01)
+    strengths = 100 * (np.abs(0.1 * np.arange(300) - ranges[:, np.newaxis]) < 0.3).astype(np.uint8)
+    beams = [
+        PlacedBeam(Beam(round(1e9 * number), "sonar", angle, heard, 0.1), np.eye(4), True)
+        for number, (angle, heard) in enumerate(zip(angles, strengths))
+    ]
+    times = np.arange(float(len(beams)))
+    straight = Track(times, np.column_stack([0.1 * times, 0.0 * times, 0.0 * times]))
+    assert without_companions(beams, straight) == (beams, [])
 
 
 @pytest.mark.parametrize("moves", [True, False])
