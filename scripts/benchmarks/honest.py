@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Callable, Dict, List, Set
 
 from benchmarks.faults import shortened
-from benchmarks.harness import MARINA, WHOLE_MARINA, benchmark_parser, mapped_as, recorded
+from benchmarks.harness import MARINA, WHOLE_MARINA, benchmark_parser, compass_alone, mapped_as, recorded
 from benchmarks.live_faults import told_by
 from benchmarks.tours import simulated
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -40,6 +40,7 @@ def recordings(seeds: List[int]) -> Dict[str, Callable[[], Recording]]:
             for what, errors in _ERRORS.items()
             for tour in _TOURS
         },
+        **{f"{tour}, compass alone": partial(_without_positions, tour) for tour in _TOURS},
     }
 
 
@@ -49,6 +50,10 @@ def _read(path: Path) -> Recording:
 
 def _drawn(tour: str, seed: int, errors: Dict[str, float]) -> Recording:
     return simulated(f"{tour}_tour").with_dvl(seed, **errors)
+
+
+def _without_positions(tour: str) -> Recording:
+    return compass_alone(_drawn(tour, 1, {}))
 
 
 def live_causes(recording: Recording, kind: OdometryKind) -> Set[str]:
