@@ -110,7 +110,7 @@ def extract_echoes(
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
     first_bin = max(_bins_above(parameters.min_range / range_resolution - 0.5), 0)
     smooth = matched_filter(strengths, sigma, first_bin)
-    ring, spread = ring_of(smooth, parameters.ring_quantile, sigma)
+    ring, spread = ring_of(smooth if is_dense else _hearing(smooth), parameters.ring_quantile, sigma)
     if is_narrow:
         around = 2 * (_bins_above(_PROFILE / range_resolution) // 2) + 1
         ring, spread = (np.minimum(one, median_filter(one, around, mode="nearest")) for one in (ring, spread))
@@ -142,24 +142,25 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
     """Return strength and spread (bins,) of what is heard at each range in most directions.
 
     The strength is the `quantile` over the directions, the spread the distance to the quantile `_SPREAD` higher,
-    averaged over some `sigma` bins: about a quarter of a standard deviation of normal speckle. Directions without the
-    background of the others, as those behind the hull, do not count. A quantile of 0 means that there is no ring.
-    Raises RefusedInput for fewer than `FEWEST_BEAMS` beams where there is one.
+    averaged over some `sigma` bins: about a quarter of a standard deviation of normal speckle. A quantile of 0 means
+    that there is no ring. Raises RefusedInput for fewer than `FEWEST_BEAMS` beams where there is one.
     """
     beams, bins = smooth.shape
     if quantile == 0.0:
         return np.zeros(bins, np.float32), np.zeros(bins, np.float32)
     if beams < FEWEST_BEAMS:
         raise RefusedInput("scans of too few beams", f"{beams}, must be at least {FEWEST_BEAMS} to see a ring")
-    hearing = _hearing(smooth)
-    ranks = [int(share * (len(hearing) - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
-    ordered = np.partition(hearing, ranks, axis=0)
+    ranks = [int(share * (beams - 1)) for share in (quantile, min(quantile + _SPREAD, 1.0))]
+    ordered = np.partition(smooth, ranks, axis=0)
     ring, upper = ordered[ranks[0]], ordered[ranks[1]]
     return ring, uniform_filter1d(upper - ring, 2 * _bins_above(_SPREAD_SIGMAS * sigma) + 1)
 
 
 def _hearing(smooth: np.ndarray) -> np.ndarray:
-    """Return the beams (k, bins) that hear a background; all of them in a scan without one, or where too few do."""
+    """Return the beams (k, bins) that hear a background; all of them in a scan without one, or where too few do.
+
+    The others, as those behind the hull, do not tell whether there is a ring.
+    """
     background = np.quantile(smooth, _BACKGROUND, axis=1)
     loud = np.quantile(background, _LOUD)
     hearing = background >= _DULL * loud
