@@ -47,17 +47,25 @@ class Master:
             stdout=subprocess.DEVNULL,
             stderr=subprocess.DEVNULL,
         )
+        deadline = time.monotonic() + START_TIMEOUT
+        while self._state() is None:
+            assert time.monotonic() < deadline, "the master does not answer"
+            time.sleep(0.05)
 
     def stop(self):
         self.process.kill()
         self.process.wait()
 
     def publishes_diagnostics(self, node):
-        try:
-            _, _, (publishers, _, _) = xmlrpc.client.ServerProxy(self.environment["ROS_MASTER_URI"]).getSystemState("/")
-        except OSError:
-            return False
+        publishers, _, _ = self._state()
         return f"/{node}" in dict(publishers).get("/diagnostics", [])
+
+    def _state(self):
+        """Return publishers, subscribers and services; None where the master does not answer."""
+        try:
+            return xmlrpc.client.ServerProxy(self.environment["ROS_MASTER_URI"]).getSystemState("/")[2]
+        except OSError:
+            return None
 
 
 @pytest.fixture
