@@ -59,6 +59,7 @@ from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.beams.steady_head import steadied
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
+_YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes with a compass alone does not show"
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
 _MOSTLY = 0.9  # share of the beams whose angles are mended: then those of the head are
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
@@ -267,13 +268,13 @@ def _heard(
 
 
 def _assumed(odometry: OdometryFound, mended: Sequence[Cause], refined: Optional[Refined]) -> Assumption:
-    """Return what no check tells of: of the odometry or of the mount, which may have been put right by the echoes."""
+    """Return what the path rests on though no check tells it: of the odometry, or of the sonar's mount."""
     if odometry.assumed.text:
         return odometry.assumed
     if mended:
         return Assumption("the mount is as the echoes tell it, to some degrees; correct tf and map again", 0.0)
     if odometry.kind is OdometryKind.HOVERING and not (refined is not None and refined.motion.is_course_told):
-        return Assumption("the sonar is turned as tf says, which nothing tells of a vehicle that strafes", 0.0)
+        return Assumption(_YAW_AS_TOLD, 0.0)
     return NOTHING_ASSUMED
 
 

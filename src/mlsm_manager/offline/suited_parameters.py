@@ -124,7 +124,7 @@ def with_cells(parameters: ReplayParameters, scans: Sequence[Scan], fixed: Colle
 
 
 def may_strafe(ahead: Solution) -> bool:
-    """Return whether scans do not go on in a run that is solved as if the vehicle goes ahead, or too few tell it."""
+    """Return whether scans do not go on in a run of a vehicle that is taken to go ahead, or are too few to tell."""
     return _goes_on(ahead) is not Answer.FINE
 
 

@@ -14,11 +14,11 @@ _SECTOR = 2.0 * np.pi / _SECTORS
 _MOSTLY = 0.8  # share of a sector's beams that hear it at one range, while the vehicle moves and all else does
 _NARROWEST = 2  # sectors
 _WIDEST = 2.0 / 3.0  # of those looked at: a ring all around is the floor or the pulse, which echo_extractor removes
-_LONG = 1.2  # m: from where a wall is nearest to where it is no longer heard at that range, an echo's length and a cell
+_LONG = 1.2  # m: how far echoes of a wall reach along a beam, an echo's length and a cell
 _FEWEST = 10  # beams of a sector
 _MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
 _LEAVES = np.array([5.0, np.pi / 2.0])  # m across its way, or rad: a vehicle that goes or turns less may follow a wall
-_MIDDLE = [(1.0 - _MOSTLY) / 2.0, (1.0 + _MOSTLY) / 2.0]  # quantiles over the time, as a wall need not be heard always
+_MIDDLE = [(1.0 - _MOSTLY) / 2.0, (1.0 + _MOSTLY) / 2.0]  # quantiles that enclose the same share of the time
 _LEFT = 0.5  # m: by which what is hidden behind it may matter
 
 
@@ -30,7 +30,7 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     angles = np.array([one.beam.angle for one in beams])
     sectors = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
     goes_along = _heard_always(beams, sectors)
-    if goes_along is None or (_may_be_wall(goes_along) and (_leaves(track) < _LEAVES).all()):
+    if goes_along is None or (_may_be_wall(goes_along) and (_width(track) < _LEAVES).all()):
         return list(beams), []
     near = goes_along | np.roll(goes_along, 1, axis=0) | np.roll(goes_along, -1, axis=0)
     near[:, 1:] |= near[:, :-1].copy()
@@ -42,16 +42,16 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
 
 
 def _may_be_wall(goes_along: np.ndarray) -> bool:
-    """Return whether no range is heard in more of the cells (sectors, cells) than that of a wall beside the vehicle."""
+    """Return whether no arc of the cells (sectors, cells) is wider than a straight wall beside the vehicle makes it."""
     nearest = _CELL * np.arange(goes_along.shape[1])
     widest = 2.0 * np.arccos(nearest / (nearest + _LONG)) + 2.0 * _SECTOR
     return bool((goes_along.sum(axis=0) * _SECTOR <= widest).all())
 
 
-def _leaves(track: Track) -> np.ndarray:
+def _width(track: Track) -> np.ndarray:
     """Return how far a vehicle went across its main direction [m], and by how much it turned [rad], most of the time.
 
-    A vehicle that follows a wall may hear it at one range all the way.
+    A vehicle that follows a wall hears it at one range all the way.
     """
     places = track.poses[:, :2] - track.poses[:, :2].mean(axis=0)
     across = np.linalg.svd(places.T @ places)[0][:, -1]

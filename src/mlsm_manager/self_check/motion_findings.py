@@ -58,7 +58,7 @@ class MotionFindings:
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
     nodes. mounts: rad, deviation of the direction in which sonar and odometry are mounted, where nothing tells it.
-    is_course_told: whether the vehicle has a usual course, which then tells a turn of the sonar.
+    is_course_told: whether the vehicle has a usual course, which shows how the sonar is turned.
     """
 
     run: Solution
@@ -252,7 +252,7 @@ def _other_ranges(found: MotionFindings) -> List[_Trial]:
 def goes_on_with_other_ranges(run: Solution, track: Track) -> bool:
     """Return whether scans of a run of a vehicle that goes ahead go on once a change of its ranges is taken out.
 
-    No where scans are too few to tell it.
+    False where scans are too few to tell.
     """
     fit = fit_of(run)
     trials = _other_ranges(MotionFindings(replace(run, state=fit.state), fit, track))
