@@ -9,6 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = ROOT / "build/plain"
+_FONTS = ENVIRONMENT / "matplotlib"  # the list of fonts, made once: each run has a new home, and making it takes seconds
 _SOURCES = ("migration", "nodes", "src", "urdf", "web", "worlds", "yaml")
 _DESCRIPTIONS = ("README.md", "LICENSE", "package.xml", "pyproject.toml", "setup.py")
 
@@ -33,12 +34,14 @@ def install(copy: Path) -> None:
         stamp.write_bytes(wanted)
     else:
         _pip("--no-deps", "--no-build-isolation", "--no-index", "--force-reinstall", str(copy))
+    run("python", "-c", "import matplotlib.font_manager", folder=copy)
 
 
 def run(*command: object, folder: Path) -> str:
     """Run a program of the environment in `folder`, with nothing of this shell; return its output, fail with it."""
     program, *arguments = map(str, command)
-    environment = {"HOME": str(folder), "PATH": os.pathsep.join([str(ENVIRONMENT / "bin"), "/usr/bin", "/bin"])}
+    paths = os.pathsep.join([str(ENVIRONMENT / "bin"), "/usr/bin", "/bin"])
+    environment = {"HOME": str(folder), "PATH": paths, "MPLCONFIGDIR": str(_FONTS)}
     done = subprocess.run(
         [str(ENVIRONMENT / "bin" / program), *arguments], env=environment, cwd=str(folder), stdout=subprocess.PIPE,
         stderr=subprocess.STDOUT, text=True, timeout=600, check=False,
