@@ -9,7 +9,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 ENVIRONMENT = ROOT / "build/plain"
-_FONTS = ENVIRONMENT / "matplotlib"  # the list of fonts, made once: each run has a new home, and making it takes seconds
+_FONTS = ENVIRONMENT / "matplotlib"  # its list of fonts, made once: making it anew in each home takes seconds
 _SOURCES = ("migration", "nodes", "src", "urdf", "web", "worlds", "yaml")
 _DESCRIPTIONS = ("README.md", "LICENSE", "package.xml", "pyproject.toml", "setup.py")
 
