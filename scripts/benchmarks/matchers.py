@@ -10,8 +10,8 @@ import numpy as np
 from mlsm_manager.localisation.parameters import MapParameters
 from mlsm_manager.scan_matching.distribution_matcher import NEARBY, DistributionMatcher
 from mlsm_manager.scan_matching.distributions import LocalDistributions
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
-from mlsm_manager.scan_matching.scan_path import POSE
+from mlsm_manager.scan_matching.scan import Belief, Matcher, MatchResult, MatchStatus, Scan
+from mlsm_manager.scan_matching.scan_path import ERRORS, POSE, RATE
 from mlsm_manager.surface_map.blocks import BlockSource, all_of
 from mlsm_manager.thesis_matching.thesis_matcher import ThesisMatcher, ThesisMatcherParameters
 from node_support.geometry import composed, move_of, seen_from, transformed, wrapped
@@ -37,27 +37,27 @@ class GicpMatcher:
         """Raises ImportError without Open3D."""
         self._open3d = import_module("open3d")
 
-    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
-        blocks, expected = all_of(target), prior.pose(scan)
-        status, correction, covariance = MatchStatus.TOO_FEW_POINTS, prior.correction, prior.covariance[POSE, POSE]
+        blocks, expected = all_of(target), belief.theta[POSE]
+        status, pose, covariance = MatchStatus.TOO_FEW_POINTS, expected, belief.covariance[POSE, POSE]
         start, used, error = time.perf_counter(), 0, np.inf
         if min(len(scan), len(blocks)) >= _FEWEST:
             # About the vehicle: turns and moves are independent there, and a map may lie far from its origin.
             origin = np.append(expected[:2], 0.0)
-            points = transformed(seen_from(origin, prior.correction), scan.points)[:, :2]
+            correction = move_of(scan.reference_pose, expected)
+            points = transformed(seen_from(origin, correction), scan.points)[:, :2]
             shapes = LocalDistributions(blocks)
             found, information = self._register(points, shapes.mean - origin[:2], shapes.covariance)
             used, error = len(found.correspondence_set), float(found.inlier_rmse)
         if used >= _FEWEST:
             matrix = found.transformation
             moved = np.array([matrix[0, 3], matrix[1, 3], np.arctan2(matrix[1, 0], matrix[0, 0])])
-            T_map_expected = move_of(origin, composed(origin, moved))
-            correction = composed(T_map_expected, prior.correction)
+            pose = composed(move_of(origin, composed(origin, moved)), expected)
             covariance = np.linalg.inv(information) * max(error, _LEAST_ERROR) ** 2
-            status = _judged(composed(T_map_expected, expected) - expected, covariance, prior)
+            status = _judged(pose - expected, covariance, belief)
         numbers = {"points_used": used, "error": error, "seconds": time.perf_counter() - start}
-        return _result(scan, prior, status, correction, covariance, numbers)
+        return _result(scan, belief, status, pose, covariance, numbers)
 
     def _register(self, points: np.ndarray, means: np.ndarray, covariances: np.ndarray) -> tuple:
         """Return Open3D's result and the (3, 3) information of x, y, yaw for echoes that err by 1 m."""
@@ -81,9 +81,9 @@ class GicpMatcher:
         return cloud
 
 
-def _judged(difference: np.ndarray, covariance: np.ndarray, prior: Prior) -> MatchStatus:
+def _judged(difference: np.ndarray, covariance: np.ndarray, belief: Belief) -> MatchStatus:
     difference = np.append(difference[:2], wrapped(difference[2]))
-    jump = np.sqrt(difference @ np.linalg.solve(prior.covariance[POSE, POSE] + covariance, difference))
+    jump = np.sqrt(difference @ np.linalg.solve(belief.covariance[POSE, POSE] + covariance, difference))
     if jump > _MOST_JUMP:
         return MatchStatus.REJECTED_JUMP
     deviation = np.sqrt(np.linalg.eigvalsh(covariance[:2, :2])[-1])
@@ -91,19 +91,20 @@ def _judged(difference: np.ndarray, covariance: np.ndarray, prior: Prior) -> Mat
 
 
 def _result(
-    scan: Scan, prior: Prior, status: MatchStatus, correction: np.ndarray, covariance: np.ndarray, numbers: dict
+    scan: Scan, belief: Belief, status: MatchStatus, pose: np.ndarray, covariance: np.ndarray, numbers: dict
 ) -> MatchResult:
-    """Return the result; besides the pose the state stays the prior's."""
-    pose, state = composed(correction, scan.reference_pose), prior.covariance.copy()
-    pose[2] = wrapped(pose[2])
+    """Return the result; besides the pose what was believed stays."""
+    theta, state = np.append(pose, belief.theta[ERRORS]), belief.covariance.copy()
+    theta[2] = wrapped(theta[2])
     if status is MatchStatus.CONVERGED:
         state[POSE, :] = state[:, POSE] = 0.0
         state[POSE, POSE] = covariance
     beam_times = np.unique(np.append(scan.times, scan.reference_time))
     return MatchResult(
-        status=status, pose=pose, velocity=scan.track.velocity_at(scan.reference_time) + prior.rate,
-        covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state,
-        beam_times=beam_times, beam_poses=composed(correction, scan.track.at(beam_times)), reason="", **numbers,
+        status=status, belief=Belief(scan.reference_time, theta, state),
+        velocity=scan.track.velocity_at(scan.reference_time) + theta[RATE], covariance=state[:6, :6],
+        beam_times=beam_times, beam_poses=composed(move_of(scan.reference_pose, pose), scan.track.at(beam_times)),
+        reason="", **numbers,
     )  # fmt: skip
 
 

@@ -11,10 +11,10 @@ from benchmarks.harness import ROOT, Row
 from benchmarks.matchers import BEAM_WIDTH
 from benchmarks.scans import KINDS, ScanMaker, SonarKind, noise_scan, still
 from mlsm_manager.scan_matching.distribution_matcher import NEARBY, DistributionMatcher
-from mlsm_manager.scan_matching.scan import Prior, Scan
+from mlsm_manager.scan_matching.scan import Belief, Scan
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry import move_of, wrapped
+from node_support.geometry import wrapped
 from sonar_simulator.simulation.scripted_vehicle import VehicleScript
 
 STARTS = 100
@@ -53,8 +53,8 @@ def start_rows(kind: SonarKind, first_seed: int = 0, count: int = STARTS) -> Lis
         matcher = DistributionMatcher(replace(NEARBY, **changes), BEAM_WIDTH, 0.0)
         cases = [_start(maker, distance, np.radians(angle), seed) for seed in range(first_seed, first_seed + count)]
         results, times = [], [time.thread_time()]
-        for scan, prior, _ in cases:
-            results.append(matcher.match(scan, target, prior))
+        for scan, belief, _ in cases:
+            results.append(matcher.match(scan, target, belief))
             times.append(time.thread_time())
         off = np.array([result.pose - true for result, (_, _, true) in zip(results, cases)])
         found = (np.hypot(*off[:, :2].T) < NEAR) & (np.abs(wrapped(off[:, 2])) < NEAR_YAW)
@@ -68,7 +68,7 @@ def start_rows(kind: SonarKind, first_seed: int = 0, count: int = STARTS) -> Lis
     return rows
 
 
-def _start(maker: ScanMaker, distance: float, angle: float, seed: int) -> Tuple[Scan, Prior, np.ndarray]:
+def _start(maker: ScanMaker, distance: float, angle: float, seed: int) -> Tuple[Scan, Belief, np.ndarray]:
     """Return a scan from near a stop of the tour, an expectation that far [m, rad] off, and the true pose (3,)."""
     rng = np.random.default_rng(seed)
     stops = tour_stops()
@@ -76,11 +76,12 @@ def _start(maker: ScanMaker, distance: float, angle: float, seed: int) -> Tuple[
     bearing = rng.uniform(-np.pi, np.pi)
     expected = pose + np.array([distance * np.cos(bearing), distance * np.sin(bearing), rng.choice([-angle, angle])])
     deviations = np.append(np.array([distance, distance, angle]) / 1.5, _FIXED)
-    return maker.scan(still(pose), still(pose), seed=1000 + seed), _prior(expected, pose, deviations), pose
+    scan = maker.scan(still(pose), still(pose), seed=1000 + seed)
+    return scan, _belief(scan, expected, deviations), pose
 
 
-def _prior(expected: np.ndarray, odometry: np.ndarray, deviations: np.ndarray) -> Prior:
-    return Prior(move_of(odometry, expected), np.zeros(3), np.zeros(2), np.diag(deviations**2))
+def _belief(scan: Scan, expected: np.ndarray, deviations: np.ndarray) -> Belief:
+    return Belief(scan.reference_time, np.append(expected, np.zeros(5)), np.diag(deviations**2))
 
 
 def cases(kind: SonarKind) -> Dict[str, Callable[[int], Case]]:
@@ -130,8 +131,7 @@ def _outcome(matcher: DistributionMatcher, case: Case, seed: int) -> Tuple[bool,
     scan, target, true = case
     rng = np.random.default_rng(seed)
     expected = scan.reference_pose + rng.normal(0.0, _DEVIATIONS[:3])
-    prior = _prior(expected, scan.reference_pose, _DEVIATIONS)
-    result = matcher.match(scan, target, prior)
+    result = matcher.match(scan, target, _belief(scan, expected, _DEVIATIONS))
     if not result.accepted:
         return False, False
     difference = result.pose - true

@@ -12,7 +12,7 @@ import numpy as np
 from mlsm_manager.joint_solver.normal_equations import POSE, YAW, NormalEquations, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.prior_mixture import PriorMixture
-from mlsm_manager.scan_matching.prediction import Fading
+from mlsm_manager.scan_matching.scan import Fading
 
 FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
 HELD_DEVIATION = 1e-6  # stands for a deviation of zero

@@ -17,7 +17,7 @@ from mlsm_manager.joint_solver.motion_models import (
 )
 from mlsm_manager.joint_solver.normal_equations import YAW, Layout, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
-from mlsm_manager.scan_matching.prediction import Fading
+from mlsm_manager.scan_matching.scan import Fading
 from node_support.geometry import harmonics
 
 AHEAD, ASIDE, TRAVEL, TURN_RATE = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw

@@ -13,8 +13,8 @@ from mlsm_manager.localisation.clouds import CorrectionHistory
 from mlsm_manager.localisation.keyframe_map import KeyframeMaps, MapSettings
 from mlsm_manager.localisation.keyframe_traces import KeyframeCarving
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted
-from mlsm_manager.scan_matching.scan import MapCloud, Matcher, MatchResult, Scan, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.map_file import Layer

@@ -13,8 +13,8 @@ from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.odometry.mending import with_trembling_smoothed
 from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, Step
-from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, advanced, advanced_path, carried_on
-from mlsm_manager.scan_matching.scan import MapCloud, Scan, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors, advanced, advanced_path, carried_on
+from mlsm_manager.scan_matching.scan import Belief, Fading, MapCloud, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION, RATE
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.live_causes import LiveCauses

@@ -17,14 +17,14 @@ from mlsm_manager.localisation.joint_session import (
     belief_of,
     belief_of_match,
     correction_of,
-    prior_at,
+    expected_at,
     update_of,
 )
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.scan import MapCloud, Matcher, MatchResult, ReportedMotion, Scan, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted, updated_by_heading
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, ReportedMotion, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
@@ -167,7 +167,7 @@ class Joint(Estimator):
         if longer is not None:
             self._expected = None
             return self._taken(scan, longer, start)
-        result = self.matcher.match(scan, self.matched, prior_at(self.correction, scan, expected))
+        result = self.matcher.match(scan, self.matched, expected_at(self.correction, scan, expected))
         if not result.accepted:
             return ScanUpdate(scan, result, False, self.belief)
         if self._session is None:
@@ -257,7 +257,7 @@ class Joint(Estimator):
         expected = updated_by_heading(expected, scan.reference_pose[2], self.errors.heading_deviation)
         if not np.trace(expected.covariance[POSITION, POSITION]) < _EXPECTED**2:
             return None
-        result = self.matcher.match(scan, self.matched, prior_of(expected, scan.reference_pose))
+        result = self.matcher.match(scan, self.matched, expected)
         covariance = result.covariance[POSITION, POSITION]
         of_place = np.sqrt(np.linalg.eigvalsh(covariance + session.unsure_of_map)[-1])
         if not result.accepted or of_place > _SURE * self.parameters.echo_deviation:

@@ -17,9 +17,9 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.solution import Fix, Solution
 from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.updates import ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, Fading, OdometryErrors, prior_of
-from mlsm_manager.scan_matching.scan import MapCloud, MatchResult, MatchStatus, Prior, Scan, Track
-from mlsm_manager.scan_matching.scan_path import ERRORS, MOTION, POSE, RATE, STATES
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Belief, Fading, MapCloud, MatchResult, MatchStatus, Scan, Track
+from mlsm_manager.scan_matching.scan_path import ERRORS, POSE, STATES
 from mlsm_manager.self_check.map_checks import AGREES, in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import odometry_decided, position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
@@ -277,10 +277,10 @@ def belief_of_match(scan: Scan, result: MatchResult, errors: OdometryErrors) -> 
     return belief
 
 
-def prior_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Prior:
-    """Return a prior where `correction` T_map_odom (3,) puts the end of a scan, as sure as `expected`."""
+def expected_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Belief:
+    """Return the belief that `correction` T_map_odom (3,) puts the end of a scan rightly, as sure as `expected`."""
     theta = np.concatenate([composed(correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
-    return prior_of(Belief(scan.reference_time, theta, expected.covariance), scan.reference_pose)
+    return Belief(scan.reference_time, theta, expected.covariance)
 
 
 def correction_of(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
@@ -300,8 +300,7 @@ def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float)
     covariance = block_diag(estimate.pose_covariance, estimate.velocity_covariance)
     times = np.linspace(min(scan.start, estimate.time - 1e-3), estimate.time, PATH_POINTS)
     result = MatchResult(
-        status=MatchStatus.CONVERGED, pose=estimate.T_map_base, velocity=estimate.velocity, covariance=covariance,
-        rate=belief.theta[RATE], motion=belief.theta[MOTION], state_covariance=belief.covariance,
+        status=MatchStatus.CONVERGED, belief=belief, velocity=estimate.velocity, covariance=covariance,
         error=estimate.distance, points_used=estimate.comparisons, seconds=seconds, beam_times=times,
         beam_poses=session.path(times),
     )  # fmt: skip

@@ -19,8 +19,7 @@ from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import MapCloud, Matcher, MatchResult, Scan, Track
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.block_store import finished

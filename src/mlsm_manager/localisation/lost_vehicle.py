@@ -7,8 +7,8 @@ import numpy as np
 
 from mlsm_manager.localisation.joint_session import belief_of_match
 from mlsm_manager.scan_matching.distribution_matcher import relocalised
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, carried_on
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Scan
+from mlsm_manager.scan_matching.prediction import OdometryErrors, carried_on
+from mlsm_manager.scan_matching.scan import Belief, Matcher, MatchResult, MatchStatus, Scan
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION, YAW
 from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.geometry import wrapped

@@ -12,8 +12,7 @@ import numpy as np
 from mlsm_manager.joint_solver.run_log import stacked, unstacked
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.scan_matching.judgement import agreement
-from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import MapCloud, Scan, Track
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, STATES
 from mlsm_manager.surface_map.blocks import ROW_WIDTH
 from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap

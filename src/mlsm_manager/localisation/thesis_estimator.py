@@ -7,12 +7,12 @@ import numpy as np
 from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
-from mlsm_manager.scan_matching.prediction import Belief, predicted, prior_of, updated_by_heading
-from mlsm_manager.scan_matching.scan import MapCloud, MatchResult, Scan, corrected_points
-from mlsm_manager.scan_matching.scan_path import ERRORS
+from mlsm_manager.scan_matching.prediction import predicted, updated_by_heading
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, MatchResult, Scan, corrected_points
+from mlsm_manager.scan_matching.scan_path import ERRORS, POSE
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.map_file import Layer
-from node_support.geometry import composed
+from node_support.geometry import composed, move_of
 
 _FEWEST_BLOCKS = 15  # of a map that can be matched with: fewer do not fix three coordinates against chance
 
@@ -37,13 +37,12 @@ class ThesisEstimator(Estimator):
         belief = self._belief_at(scan)
         if not self.matching or len(self.matched) < _FEWEST_BLOCKS:
             return self._place(scan, belief)
-        result = self.matcher.match(scan, self.matched, prior_of(belief, scan.reference_pose))
+        result = self.matcher.match(scan, self.matched, belief)
         return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Accept a match: insert the scan into the map, and take its pose over into the belief."""
-        theta = np.concatenate([result.pose, result.rate, result.motion])
-        self.belief = Belief(scan.reference_time, theta, result.state_covariance)
+        self.belief = result.belief
         self.correction = result.correction(scan)
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
         self._insert_matched(corrected_points(scan, result), scan.times)
@@ -66,7 +65,7 @@ class ThesisEstimator(Estimator):
         self.belief = Belief(belief.time, belief.theta, self.errors.covariance())
         # Where no error is known nothing is corrected: not even by rounding, so that clouds stay as they came.
         if belief.theta[ERRORS].any():
-            self.correction = prior_of(belief, scan.reference_pose).correction
+            self.correction = move_of(scan.reference_pose, belief.theta[POSE])
         return ScanUpdate(scan, None, True, self.belief)
 
     def _reject(self, scan: Scan, result: MatchResult, belief: Belief) -> ScanUpdate:
@@ -93,5 +92,5 @@ class ThesisEstimator(Estimator):
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""
         times = np.unique(np.append(np.linspace(scan.start, scan.reference_time, PATH_POINTS), scan.reference_time))
-        correction = prior_of(belief, scan.reference_pose).correction
+        correction = move_of(scan.reference_pose, belief.theta[POSE])
         return times, composed(correction, scan.track.at(times))

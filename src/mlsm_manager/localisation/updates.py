@@ -6,8 +6,8 @@ from typing import List, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.odometry.steps import Step
-from mlsm_manager.scan_matching.prediction import Belief
-from mlsm_manager.scan_matching.scan import MatchResult, Scan
+from mlsm_manager.scan_matching.scan import Belief, MatchResult, Scan
+from mlsm_manager.scan_matching.scan_path import DIRECTION, SCALE
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.free_space import CarveReport
@@ -78,8 +78,8 @@ def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     health.show("match time [ms]", f"{1e3 * result.seconds:.1f}")
     deviations = result.covariance.diagonal() ** 0.5
     health.show("fix standard deviations x y [m] yaw [rad]", " ".join(f"{value:.3f}" for value in deviations[:3]))
-    health.show("odometry scale error", f"{result.motion[0]:.3f}")
-    health.show("odometry direction error [rad]", f"{result.motion[1]:.4f}")
+    health.show("odometry scale error", f"{result.belief.theta[SCALE]:.3f}")
+    health.show("odometry direction error [rad]", f"{result.belief.theta[DIRECTION]:.4f}")
     if update.found:
         health.count("times found again after a silence")
         health.show("found again", update.found)

@@ -11,10 +11,10 @@ from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.gauss_newton import Fit, PriorState, Refiner
 from mlsm_manager.scan_matching.judgement import agreement, lead_along, significance
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from mlsm_manager.scan_matching.scan import Matcher, MatchResult, MatchStatus, Prior, Scan
-from mlsm_manager.scan_matching.scan_path import MOTION, POSE, POSITION, RATE, RATE_YAW, STATES, YAW, PlanarMotion, X, Y
+from mlsm_manager.scan_matching.scan import Belief, Matcher, MatchResult, MatchStatus, Scan
+from mlsm_manager.scan_matching.scan_path import POSE, POSITION, RATE_YAW, STATES, YAW, PlanarMotion, X, Y
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
-from node_support.geometry import move_of, wrapped
+from node_support.geometry import wrapped
 
 _WINDOW_DEVIATIONS = 3.0  # of the prior, that the search covers
 # Of a score from 0 to 1 per squared standard deviation of the prior: echoes that travel with the vehicle cannot win.
@@ -81,10 +81,10 @@ class DistributionMatcher:
         self.beam_width = beam_width
         self.range_scale_deviation = range_scale_deviation
 
-    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
-        state = prior_state(prior, scan)
+        state = _prior_state(belief)
         motion = PlanarMotion(scan, self.beam_width / np.sqrt(12.0))
         fewest = self.limits.min_points
         window = self._window(motion, state)
@@ -196,12 +196,11 @@ def relocalised(scan: Scan, target: BlockSource, matcher: Matcher, errors: Odome
     target = all_of(target)
     centers = target.mean[:, :2] if len(target) else np.zeros((1, 2))
     low, high = centers.min(axis=0), centers.max(axis=0)
-    middle = np.append((low + high) / 2.0, scan.reference_pose[2])
+    middle = np.concatenate([(low + high) / 2.0, scan.reference_pose[2:], np.zeros(STATES - 3)])
     covariance = errors.covariance()
     covariance[X, X] = covariance[Y, Y] = (float((high - low).max()) / 4.0 + 1.0) ** 2
     covariance[YAW, YAW] = np.pi**2
-    correction = move_of(scan.reference_pose, middle)
-    return matcher.match(scan, target, Prior(correction, np.zeros(3), np.zeros(2), covariance))
+    return matcher.match(scan, target, Belief(scan.reference_time, middle, covariance))
 
 
 def _in_reach(target: BlockSource, motion: PlanarMotion, state: PriorState, window: SearchWindow) -> Blocks:
@@ -218,11 +217,9 @@ def _excluded(fit: Fit, theta: np.ndarray) -> bool:
     return bool(difference @ np.linalg.solve(fit.covariance[POSE, POSE], difference) > _EXCLUDED**2)
 
 
-def prior_state(prior: Prior, scan: Scan) -> PriorState:
-    """Return the prior over the eight states of scan_path; states without variance are fixed."""
-    covariance = prior.covariance + _LEAST_VARIANCE * np.eye(STATES)
-    mean = np.concatenate([prior.pose(scan), prior.rate, prior.motion])
-    return PriorState(mean, np.linalg.inv(covariance))
+def _prior_state(belief: Belief) -> PriorState:
+    """Return what is believed as a prior; states without variance are fixed."""
+    return PriorState(belief.theta, np.linalg.inv(belief.covariance + _LEAST_VARIANCE * np.eye(STATES)))
 
 
 def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, start: float) -> MatchResult:
@@ -232,12 +229,9 @@ def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, st
     to_output[3:] = motion.velocity_jacobian(fit.theta)
     return MatchResult(
         status=status,
-        pose=fit.theta[POSE],
+        belief=Belief(float(motion.beam_times[-1]), fit.theta, fit.covariance),
         velocity=motion.velocity(fit.theta),
         covariance=to_output @ fit.covariance @ to_output.T,
-        rate=fit.theta[RATE],
-        motion=fit.theta[MOTION],
-        state_covariance=fit.covariance,
         error=float(used.mean()) if used.size else float("inf"),
         points_used=int(used.size),
         seconds=time.perf_counter() - start,

@@ -1,12 +1,12 @@
 """Carries what is known of pose and odometry errors from scan to scan (an extended Kalman filter's prediction)."""
 
 import math
-from dataclasses import dataclass, replace
-from typing import Optional, Tuple
+from dataclasses import dataclass
+from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.scan_matching.scan import Prior, Track
+from mlsm_manager.scan_matching.scan import Belief, Track
 from mlsm_manager.scan_matching.scan_path import (
     DIRECTION,
     ERRORS,
@@ -24,31 +24,11 @@ from mlsm_manager.scan_matching.scan_path import (
     X,
     Y,
 )
-from node_support.geometry import move_of, rotated, seen_from, wrapped
+from node_support.geometry import rotated, seen_from, wrapped
 from node_support.parameters import ParameterSet, parameter
 
 _NODES = 17  # times at which the odometry is read between two scans, about one a second
 _DIFFERENCE = 1e-6  # of each state: small against a bend of the path, large against rounding
-
-
-@dataclass(frozen=True)
-class Fading:
-    """Errors of speed and turn rate return to what is usual (the mean of an Ornstein-Uhlenbeck process).
-
-    usual: (3,) m/s, m/s, rad/s in base_link. times: (3,) s within which their differences from it fall to a third;
-    infinity where they stay.
-    """
-
-    usual: np.ndarray
-    times: np.ndarray
-
-    def after(self, rates: np.ndarray, seconds: float) -> np.ndarray:
-        """Return the errors (3,) that are expected `seconds` after they were `rates` (3,)."""
-        return self.usual + np.exp(-seconds / self.times) * (rates - self.usual)
-
-    def to_a_stop(self) -> "Fading":
-        """Return one with which the vehicle comes to rest."""
-        return replace(self, usual=np.zeros_like(self.usual))
 
 
 @dataclass(frozen=True)
@@ -92,19 +72,6 @@ class OdometryErrors(ParameterSet):
         return np.diag(deviations**2)
 
 
-@dataclass(frozen=True)
-class Belief:
-    """What is known at a time. theta: (8,) [pose, rate, motion] as in scan_path. covariance: (8, 8).
-
-    fading: how the rates go on until the next belief; None where they stay.
-    """
-
-    time: float
-    theta: np.ndarray
-    covariance: np.ndarray
-    fading: Optional[Fading] = None
-
-
 def predicted(belief: Belief, track: Track, time: float, errors: OdometryErrors) -> Belief:
     """Return the belief at a later `time`: the pose follows the odometry and its errors, the errors fade."""
     theta = _advanced(belief.theta, belief.time, track, time)
@@ -134,12 +101,6 @@ def updated_by_heading(belief: Belief, heading: float, deviation: float) -> Beli
     gain = belief.covariance[:, YAW] / (belief.covariance[YAW, YAW] + deviation**2)
     theta = belief.theta + gain * float(wrapped(heading - belief.theta[YAW]))
     return Belief(belief.time, theta, belief.covariance - np.outer(gain, belief.covariance[YAW]))
-
-
-def prior_of(belief: Belief, odometry_pose: np.ndarray) -> Prior:
-    """Return the belief as a matcher's prior; `odometry_pose` is T_odom_base (3,) at its time."""
-    correction = move_of(odometry_pose, belief.theta[POSE])
-    return Prior(correction, belief.theta[RATE], belief.theta[MOTION], belief.covariance)
 
 
 def advanced_path(theta: np.ndarray, start: float, track: Track, times: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.errors import RefusedInput
-from node_support.geometry import composed, move_of, seen_from, transformed, wrapped
+from node_support.geometry import move_of, seen_from, transformed, wrapped
 
 _STANDS = 0.05  # m: a position that moves by less never changed, but for rounding and lever arms of a tilting base
 _TURNS = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more
@@ -215,48 +215,57 @@ class MatchStatus(Enum):
 
 
 @dataclass(frozen=True)
-class Prior:
-    """What odometry and earlier matches tell before a scan is matched; its covariance must be true.
+class Fading:
+    """Errors of speed and turn rate return to what is usual (the mean of an Ornstein-Uhlenbeck process).
 
-    correction: (3,) planar T_map_odom at the scan's reference time; the pose it gives is T_map_odom * T_odom_base.
-    rate: (3,) error of the odometry's velocity during the scan, m/s, m/s, rad/s in the vehicle's frame: the true
-        body velocity is the odometry's plus this.
-    motion: (2,) relative error of the distances that the odometry reports, and error of their direction [rad]:
-        the vehicle went 1 + motion[0] times as far, turned by motion[1] counter-clockwise.
-    covariance: (8, 8) of [pose, rate, motion]; pose: x y [m] in map, yaw [rad] of base_link at the reference time.
-        A state without variance is fixed.
+    usual: (3,) m/s, m/s, rad/s in base_link. times: (3,) s within which their differences from it fall to a third;
+    infinity where they stay.
     """
 
-    correction: np.ndarray
-    rate: np.ndarray
-    motion: np.ndarray
-    covariance: np.ndarray
+    usual: np.ndarray
+    times: np.ndarray
 
-    def pose(self, scan: Scan) -> np.ndarray:
-        """Return the (3,) T_map_base expected at the scan's reference time."""
-        return composed(self.correction, scan.reference_pose)
+    def after(self, rates: np.ndarray, seconds: float) -> np.ndarray:
+        """Return the errors (3,) that are expected `seconds` after they were `rates` (3,)."""
+        return self.usual + np.exp(-seconds / self.times) * (rates - self.usual)
+
+    def to_a_stop(self) -> "Fading":
+        """Return one with which the vehicle comes to rest."""
+        return replace(self, usual=np.zeros_like(self.usual))
+
+
+@dataclass(frozen=True)
+class Belief:
+    """What is known at a time, its covariance (8, 8) included, which must be true.
+
+    theta: (8,) as in scan_path. T_map_base: x y [m], yaw [rad]; the error of the odometry's velocity in base_link, m/s,
+    m/s, rad/s: the true one is the reported one plus this; the relative error of the distances that are reported, and
+    that of their direction [rad]. A state without variance is fixed.
+    fading: how the rates go on until the next belief; None where they stay.
+    """
+
+    time: float
+    theta: np.ndarray
+    covariance: np.ndarray
+    fading: Optional[Fading] = None
 
 
 @dataclass(frozen=True)
 class MatchResult:
-    """Where a scan was taken. Only an `accepted` one says more than the prior did.
+    """Where a scan was taken. Only an `accepted` one says more than what was believed before.
 
-    pose: (3,) T_map_base, x y [m] yaw [rad], at the scan's reference time.
+    belief: at the scan's reference time, what was believed before included.
     velocity: (3,) in the vehicle's frame at the reference time, m/s, m/s, rad/s.
-    covariance: (6, 6) of [pose, velocity], prior included.
-    rate, motion, state_covariance: as in `Prior`, after the match; the covariance is (8, 8) of [pose, rate, motion].
+    covariance: (6, 6) of [pose, velocity].
     error: mean distance of the used points from the map, m. seconds: time the match took.
     reason: one line that says why a match was not accepted, with the value that decided; empty when it was accepted.
     beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
     """
 
     status: MatchStatus
-    pose: np.ndarray
+    belief: Belief
     velocity: np.ndarray
     covariance: np.ndarray
-    rate: np.ndarray
-    motion: np.ndarray
-    state_covariance: np.ndarray
     error: float
     points_used: int
     seconds: float
@@ -268,6 +277,11 @@ class MatchResult:
     def accepted(self) -> bool:
         """Whether the match holds."""
         return self.status is MatchStatus.CONVERGED
+
+    @property
+    def pose(self) -> np.ndarray:
+        """(3,) T_map_base, x y [m] yaw [rad], at the scan's reference time."""
+        return self.belief.theta[:3]
 
     def correction(self, scan: Scan) -> np.ndarray:
         """Return the (3,) T_map_odom at the scan's reference time that this pose means."""
@@ -285,10 +299,11 @@ class MatchResult:
 class Matcher(Protocol):
     """Finds where a scan lies among blocks."""
 
-    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
         """Return where the scan was taken; never raises for a scan or a target that cannot be matched.
 
-        `target` gives the blocks in map; a matcher fetches those within the scan's reach, or all.
+        `target` gives the blocks in map; a matcher fetches those within the scan's reach, or all. belief: before the
+        match, at the scan's reference time.
         """
 
 

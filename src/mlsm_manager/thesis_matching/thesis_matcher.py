@@ -14,10 +14,10 @@ from typing import List, NamedTuple, Optional, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.scan_matching.scan import MatchResult, MatchStatus, Prior, Scan
-from mlsm_manager.scan_matching.scan_path import POSE, POSITION
+from mlsm_manager.scan_matching.scan import Belief, MatchResult, MatchStatus, Scan
+from mlsm_manager.scan_matching.scan_path import ERRORS, POSE, POSITION, RATE, YAW
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
-from node_support.geometry import composed, rotated, transformed, wrapped
+from node_support.geometry import composed, move_of, rotated, transformed, wrapped
 from node_support.parameters import ParameterSet, parameter
 
 _MEDIANS = 3.0  # of normal errors across a wall 4 % are farther
@@ -197,21 +197,21 @@ class ThesisMatcher:
     def __init__(self, parameters: ThesisMatcherParameters) -> None:
         self.parameters = parameters
 
-    def match(self, scan: Scan, target: BlockSource, prior: Prior) -> MatchResult:
+    def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
         """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
         blocks, order = all_of(target), np.argsort(scan.times, kind="stable")
         scan = replace(scan, points=scan.points[order], times=scan.times[order], moving=scan.moving[order])
+        correction = move_of(scan.reference_pose, belief.theta[POSE])
+        fit = _Fit(correction, np.zeros((len(scan), 2)), np.zeros(2), np.inf, 0)
         if len(scan) < _FEWEST_POINTS or not len(blocks):
-            fit = _Fit(prior.correction, np.zeros((len(scan), 2)), np.zeros(2), np.inf, 0)
-            return _result(MatchStatus.TOO_FEW_POINTS, scan, prior, fit, start)
-        fit = self._registered(scan, blocks, prior)
+            return _result(MatchStatus.TOO_FEW_POINTS, scan, belief, fit, start)
+        fit = self._registered(scan, blocks, fit)
         holds = fit.error <= self.parameters.error_threshold
-        return _result(MatchStatus.CONVERGED if holds else MatchStatus.DIVERGED, scan, prior, fit, start)
+        return _result(MatchStatus.CONVERGED if holds else MatchStatus.DIVERGED, scan, belief, fit, start)
 
-    def _registered(self, scan: Scan, blocks: Blocks, prior: Prior) -> _Fit:
-        closest, steps = ClosestBlocks(blocks), self._steps(scan, prior)
-        fit = _Fit(prior.correction, np.zeros((len(scan), 2)), np.zeros(2), np.inf, 0)
+    def _registered(self, scan: Scan, blocks: Blocks, fit: _Fit) -> _Fit:
+        closest, steps = ClosestBlocks(blocks), self._steps(scan, fit.correction)
         while fit.iterations < self.parameters.max_iterations:
             places = fit.placed(scan.points)
             found = closest.find_along(places, steps, self.parameters.n_samples)
@@ -227,11 +227,11 @@ class ThesisMatcher:
                 break
         return fit
 
-    def _steps(self, scan: Scan, prior: Prior) -> np.ndarray:
+    def _steps(self, scan: Scan, correction: np.ndarray) -> np.ndarray:
         """Return (n, 3) one sample's step of each point: moving time times velocity times sample_step, in map."""
         first, last = scan.track.at(np.array([scan.times[0], scan.reference_time]))
         velocity = (last - first)[:2] / max(scan.reference_time - scan.times[0], 1e-9)
-        velocity = rotated(velocity, prior.correction[2])
+        velocity = rotated(velocity, correction[2])
         seconds = np.cumsum(np.where(scan.moving, np.diff(scan.times, prepend=scan.times[0]), 0.0))
         steps = np.zeros((len(scan), 3))
         steps[:, :2] = seconds[:, np.newaxis] * velocity * self.parameters.sample_step
@@ -255,21 +255,21 @@ def _error(places: np.ndarray, blocks: Blocks) -> float:
     return float(np.where(distance <= spread, 0.0, distance).mean())
 
 
-def _result(status: MatchStatus, scan: Scan, prior: Prior, fit: _Fit, start: float) -> MatchResult:
+def _result(status: MatchStatus, scan: Scan, belief: Belief, fit: _Fit, start: float) -> MatchResult:
     """Return the result of a match that began at `start` [s]."""
     beam_times, first_of_beam = np.unique(np.append(scan.times, scan.reference_time), return_index=True)
     beam_poses = composed(fit.correction, scan.track.at(beam_times))
     beam_poses[:, :2] += np.vstack([fit.shifts, fit.shifts[-1:] if len(scan) else np.zeros((1, 2))])[first_of_beam]
-    pose = beam_poses[-1].copy()
-    pose[2] = wrapped(pose[2])
-    missed = np.append(rotated(fit.slope, -pose[2]), 0.0)
-    state, accepted = prior.covariance.copy(), status is MatchStatus.CONVERGED
+    theta = np.append(beam_poses[-1], belief.theta[ERRORS])
+    theta[YAW] = wrapped(theta[YAW])
+    missed = np.append(rotated(fit.slope, -theta[YAW]), 0.0)
+    state, accepted = belief.covariance.copy(), status is MatchStatus.CONVERGED
     if accepted:
         _take_error(state, scan, fit.error)
     return MatchResult(
-        status=status, pose=pose, velocity=scan.track.velocity_at(scan.reference_time) + prior.rate + missed,
-        covariance=state[:6, :6], rate=prior.rate, motion=prior.motion, state_covariance=state, error=float(fit.error),
-        points_used=len(scan), seconds=time.perf_counter() - start, beam_times=beam_times,
+        status=status, belief=Belief(scan.reference_time, theta, state),
+        velocity=scan.track.velocity_at(scan.reference_time) + theta[RATE] + missed, covariance=state[:6, :6],
+        error=float(fit.error), points_used=len(scan), seconds=time.perf_counter() - start, beam_times=beam_times,
         beam_poses=beam_poses, reason="" if accepted else f"error {fit.error:.3f} m after {fit.iterations} iterations",
     )  # fmt: skip
 

@@ -3,7 +3,7 @@
 import numpy as np
 from made_maps import map_with
 
-from mlsm_manager.scan_matching.scan import Prior, Scan, Track
+from mlsm_manager.scan_matching.scan import Belief, Scan, Track
 from node_support.geometry import composed, move_of, transformed
 
 SECONDS = 16.0
@@ -81,7 +81,6 @@ def map_of(places, resolution=0.5):
     return map_with(points, resolution).blocks
 
 
-def prior_of_pose(scan, pose, deviations=DEVIATIONS):
-    """Return the prior that believes in `pose` (3,) at the reference time and in the odometry's motion."""
-    correction = move_of(scan.reference_pose, np.array(pose, dtype=float))
-    return Prior(correction, np.zeros(3), np.zeros(2), np.diag(np.array(deviations) ** 2))
+def belief_in(pose, scan, deviations=DEVIATIONS):
+    """Return the belief in `pose` (3,) at the end of a scan and in the odometry's motion."""
+    return Belief(scan.reference_time, np.append(pose, np.zeros(5)), np.diag(np.array(deviations) ** 2))

@@ -10,8 +10,7 @@ from made_scans import at_velocity, still
 
 from mlsm_manager.localisation.clouds import CorrectionHistory
 from mlsm_manager.localisation.following import LiveCorrection
-from mlsm_manager.scan_matching.prediction import Belief, Fading
-from mlsm_manager.scan_matching.scan import MapCloud, Track
+from mlsm_manager.scan_matching.scan import Belief, Fading, MapCloud, Track
 
 TIMES = np.arange(0.0, 10.0, 0.1)
 

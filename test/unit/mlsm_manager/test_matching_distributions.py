@@ -7,7 +7,7 @@ import pytest
 from benchmarks.matchers import BEAM_WIDTH
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from made_scans import DEVIATIONS, at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
+from made_scans import DEVIATIONS, at_velocity, belief_in, harbour, map_of, scan_of, still, wall
 from scipy.stats import chi2
 
 from mlsm_manager.scan_matching.distribution_matcher import NEARBY, DistributionMatcher
@@ -15,6 +15,7 @@ from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.judgement import agreement
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
 from mlsm_manager.scan_matching.scan import MatchStatus, corrected_points
+from mlsm_manager.scan_matching.scan_path import SCALE
 
 pytestmark = pytest.mark.newest_only("slow; scans are matched with every version by the tests of the localiser")
 
@@ -23,7 +24,7 @@ FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 
 def match(scan, target, expected, deviations=DEVIATIONS, **changes):
     matcher = DistributionMatcher(replace(NEARBY, **changes), BEAM_WIDTH, 0.0)
-    return matcher.match(scan, target, prior_of_pose(scan, expected, deviations))
+    return matcher.match(scan, target, belief_in(expected, scan, deviations))
 
 
 @settings(max_examples=8)
@@ -78,7 +79,7 @@ def test_a_scale_error_of_the_odometry_is_found_while_it_moves():
     scan = scan_of(harbour(), truth, at_velocity((0.2, 0.0, 0.0)), moving=True)
     deviations = np.array([1.0, 1.0, 0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.1])
     result = match(scan, map_of(harbour()), truth(16.0), deviations)
-    assert result.motion[0] == pytest.approx(0.5, abs=0.05)
+    assert result.belief.theta[SCALE] == pytest.approx(0.5, abs=0.05)
 
 
 def test_the_prior_keeps_what_it_is_sure_of():
@@ -92,7 +93,7 @@ def test_the_prior_keeps_what_it_is_sure_of():
 def test_a_match_makes_the_prior_surer_and_never_less_sure():
     scan = scan_of(harbour(), still())
     result = match(scan, map_of(harbour()), np.zeros(3))
-    deviations = np.sqrt(np.diag(result.state_covariance))
+    deviations = np.sqrt(np.diag(result.belief.covariance))
     assert (deviations <= DEVIATIONS * (1.0 + 1e-6)).all()
     assert (deviations[:3] < 0.1 * DEVIATIONS[:3]).all()
 
@@ -161,7 +162,7 @@ def test_a_refinement_that_finds_no_end_says_so():
 def test_an_unmatched_scan_keeps_the_priors_pose():
     result = match(scan_of(harbour()[:3], still()), map_of(harbour()), [1.0, 2.0, 0.3])
     np.testing.assert_allclose(result.pose, [1.0, 2.0, 0.3])
-    np.testing.assert_allclose(np.diag(result.state_covariance), DEVIATIONS**2, rtol=1e-4)
+    np.testing.assert_allclose(np.diag(result.belief.covariance), DEVIATIONS**2, rtol=1e-4)
 
 
 def test_the_correction_takes_the_odometrys_pose_to_the_matched_one():
@@ -291,7 +292,7 @@ def test_a_vehicle_that_stands_still_does_not_become_surer_than_the_map():
     for _ in range(36):
         scan = scan_of(heard(harbour(0.2), np.zeros(2), 0.15, rng), still())
         result = match(scan, target, np.zeros(3), deviations)
-        deviations = np.sqrt(np.diag(result.state_covariance))
+        deviations = np.sqrt(np.diag(result.belief.covariance))
         found.append(deviations[:2])
     assert (found[-1] > found[0] / 3.0).all()
 

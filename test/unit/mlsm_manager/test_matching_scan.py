@@ -7,8 +7,8 @@ from hypothesis import strategies as st
 from made_scans import at_velocity, harbour, scan_of, still
 from scipy.spatial import cKDTree
 
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors, predicted, prior_of
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted
+from mlsm_manager.scan_matching.scan import Belief, Scan, Track
 from mlsm_manager.scan_matching.scan_path import STATES, PlanarMotion
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, inverse, transformed, wrapped
@@ -184,10 +184,3 @@ def test_an_error_of_the_speed_fades_and_what_fades_becomes_unknown():
     after = predicted(Belief(0.0, theta, np.zeros((STATES, STATES))), track, 16.0, errors)
     np.testing.assert_allclose(after.theta[3], 0.1 / np.e)
     np.testing.assert_allclose(after.covariance[3, 3], errors.speed_deviation**2 * (1.0 - np.exp(-2.0)))
-
-
-def test_a_belief_makes_a_prior_that_expects_the_same_pose():
-    scan = scan_of(harbour(), still((3.0, 4.0, 0.5)), still((1.0, 0.0, 0.2)))
-    theta = np.concatenate([[3.0, 4.0, 0.5], np.zeros(5)])
-    prior = prior_of(Belief(16.0, theta, np.eye(STATES)), scan.reference_pose)
-    np.testing.assert_allclose(prior.pose(scan), [3.0, 4.0, 0.5], atol=1e-12)

@@ -7,8 +7,8 @@ from made_scans import SECONDS, at_velocity, drifting, elsewhere, harbour, scan_
 from mlsm_manager.localisation.lost_vehicle import FoundPlace, PlaceSearch
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.localisation.resumption import StoredPlace
-from mlsm_manager.scan_matching.prediction import Belief, OdometryErrors
-from mlsm_manager.scan_matching.scan import MatchStatus, Track
+from mlsm_manager.scan_matching.prediction import OdometryErrors
+from mlsm_manager.scan_matching.scan import Belief, MatchStatus, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, map_bytes, map_of_bytes
 from node_support.geometry import composed

@@ -7,7 +7,7 @@ from benchmarks.scans import KINDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_maps import map_with
-from made_scans import at_velocity, harbour, map_of, prior_of_pose, scan_of, still, wall
+from made_scans import at_velocity, belief_in, harbour, map_of, scan_of, still, wall
 from thesis_results.moves import displaced_fix
 from thesis_results.thesis_scans import ThesisScans, thesis_estimator
 
@@ -28,7 +28,7 @@ OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)
 
 def match(scan, target, expected, **changes):
     matcher = ThesisMatcher(ThesisMatcherParameters().changed(changes))
-    return matcher.match(scan, target, prior_of_pose(scan, expected))
+    return matcher.match(scan, target, belief_in(expected, scan))
 
 
 def segments(times, moving, errors):
@@ -159,7 +159,7 @@ def test_the_yaw_of_a_moving_scan_stays_the_priors():
     scan = scan_of(harbour(), still(), moving=True)
     result = match(scan, map_of(harbour()), [0.0, 0.0, 0.02])
     assert result.pose[2] == pytest.approx(0.02)
-    assert result.covariance[2, 2] == pytest.approx(prior_of_pose(scan, np.zeros(3)).covariance[2, 2])
+    assert result.covariance[2, 2] == pytest.approx(belief_in(np.zeros(3), scan).covariance[2, 2])
 
 
 def test_a_velocity_that_the_odometry_missed_is_found_among_posts():
@@ -212,7 +212,7 @@ def test_a_wall_lets_it_slide_and_it_does_not_notice():
 
 def gicp_match(scan, target, expected):
     pytest.importorskip("open3d")
-    return GicpMatcher().match(scan, target, prior_of_pose(scan, expected))
+    return GicpMatcher().match(scan, target, belief_in(expected, scan))
 
 
 @settings(max_examples=10)
