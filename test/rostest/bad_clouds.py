@@ -59,12 +59,6 @@ class BadClouds(unittest.TestCase):
         self.send_to_all(cloud)
         self.expect_for_all("clouds refused", 1)
 
-    def test_2_data_shorter_than_its_header_says(self) -> None:
-        cloud = still_cloud(wall())
-        cloud.cloud.data = cloud.cloud.data[:-7]
-        self.send_to_all(cloud)
-        self.expect_for_all("clouds refused", 2)
-
     def test_3_points_and_stamps_that_are_not_finite_are_left_out(self) -> None:
         points = wall()
         points[7, 0] = np.nan
@@ -79,7 +73,7 @@ class BadClouds(unittest.TestCase):
 
     def test_4_an_empty_cloud_passes(self) -> None:
         self.send_to_all(still_cloud(np.zeros((0, 4), np.float32)))
-        self.diagnostics.wait_for("mlsm_core", "clouds in", 5)
+        self.diagnostics.wait_for("mlsm_core", "clouds in", 4)
 
     def test_5_a_cloud_far_outside_is_left_out_of_the_map(self) -> None:
         """1000 km away is a broken transform, not a wall."""
@@ -96,7 +90,7 @@ class BadClouds(unittest.TestCase):
     def test_6_a_cloud_in_another_frame_is_refused_by_the_map(self) -> None:
         """The map cannot know where the sonar was."""
         self.inputs["mlsm_core"].publish(still_cloud(wall(), frame="sonar"))
-        self.diagnostics.wait_for("mlsm_core", "clouds refused", 3)
+        self.diagnostics.wait_for("mlsm_core", "clouds refused", 2)
 
     def test_7_a_good_cloud_still_goes_all_the_way(self) -> None:
         self.map.wait_for_link()

@@ -13,7 +13,6 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import PACKAGE_ROOT, Diagnostics, Inbox, run, skip, wait_for_links, wait_for_publisher_links
 from nav_msgs.msg import Odometry
 from rep_rules import broken_rules, broken_tree
-from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 
 from sonar_processing.cloud import Cloud
@@ -75,10 +74,6 @@ class Standing(unittest.TestCase):
             skip("robot_localization", f"{FILTER} is not installed: yaml/robot_localization.yaml was not played")
         self.addCleanup(self.filter.terminate)
         self.filtered.wait_for(lambda message: abs(message.pose.pose.position.x - 0.5) < 0.1)
-
-    def test_the_place_can_be_searched_for(self) -> None:
-        answer = rospy.ServiceProxy("/mlsm_core/relocalise", Trigger)()
-        self.assertTrue(answer.success, answer.message)
 
     def test_time_did_not_jump(self) -> None:
         """A transform that holds for all time has the stamp 0."""

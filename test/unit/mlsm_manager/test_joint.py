@@ -94,7 +94,8 @@ def test_points_beyond_the_limit_are_counted_before_anybody_looks_at_the_map():
 
 def test_a_long_silence_is_followed_by_the_odometry():
     localiser, _ = localiser_after(3)
-    later = SCANS[8].reference_time
+    end, later = SCANS[2].reference_time, SCANS[8].reference_time
+    assert [localiser.silent_since(end + seconds) for seconds in (119.0, 121.0)] == [None, end]
     localiser.follow(SCANS[8].track, later)
     assert localiser.believed_until == later
     update = localiser.take_scan(SCANS[9]).scan

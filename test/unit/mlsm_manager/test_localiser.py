@@ -81,14 +81,6 @@ def test_stamps_that_overtake_each_other_by_seconds_are_no_jump():
     assert localiser.believed_until == 2 * SECONDS
 
 
-def test_a_long_silence_is_followed_by_the_odometry():
-    localiser, _ = localiser_after(1)
-    assert localiser.silent_since(SECONDS + 119.0) is None
-    assert localiser.silent_since(SECONDS + 121.0) == SECONDS
-    localiser.follow(drifting(4).track, SECONDS + 121.0)
-    assert localiser.believed_until == SECONDS + 121.0
-
-
 @pytest.mark.long
 def test_relocalisation_finds_the_newest_scan_anywhere_in_the_map():
     localiser, _ = localiser_after(1, estimator=EstimatorName.THESIS)

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
-from node_support.geometry import pose_matrix, wrapped
+from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_processing.beams.beam import Beam, project_beams
 from sonar_processing.beams.parameters import BeamCorrection, MountingParameters
@@ -142,13 +142,6 @@ def test_dispersed_points_keep_range_and_strength(sides):
     points = _projected(beam_of((4, 5, 6)), sides=sides).reshape(sides, 3, 4)
     np.testing.assert_allclose(np.hypot(points[..., 0], points[..., 1]), [[0.5, 1.5, 2.5]] * sides, rtol=1e-6)
     assert points[..., 3].tolist() == [[4, 5, 6]] * sides
-
-
-@given(st.floats(-100.0, 100.0))
-def test_wrapped_angles_point_the_same_way_within_half_a_turn(angle):
-    result = wrapped(angle)
-    assert -math.pi <= result < math.pi
-    assert math.cos(result - angle) == pytest.approx(1.0)
 
 
 def _first_bin(angle, **mounting):
