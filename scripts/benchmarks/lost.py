@@ -6,7 +6,6 @@ its position is called good, at most ten. A position is wrong if it is off by mo
 what is stated. After half of a tour some vehicles are where the map has nothing: these should not be called good.
 """
 
-from dataclasses import replace
 from functools import partial
 from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
@@ -16,6 +15,7 @@ from benchmarks.canals import made_canal, made_path, recorded_along
 from benchmarks.harness import benchmark_parser
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
+from mlsm_manager.localisation.joint_session import moved
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
@@ -23,7 +23,6 @@ from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.map_file import StoredMap
-from node_support.geometry import composed, transformed
 
 _MOST_SCANS = 10
 _WRONG, _SURE = 3.0, 4.0  # m, stated deviations
@@ -126,15 +125,9 @@ def starts(case: Case, share: float, count: int) -> List[Start]:
         frame = np.append(rng.uniform(-_FAR, _FAR, 2), rng.uniform(-np.pi, np.pi))
         localiser = parameters.build_localiser(case.other.sonar_in_base)
         localiser.restore(stored, False)
-        moved = (in_frame(frame, scan) for scan in scans[first : first + _MOST_SCANS])
-        found.append(started(localiser, moved, case.truth))
+        elsewhere = (moved(scan, frame) for scan in scans[first : first + _MOST_SCANS])
+        found.append(started(localiser, elsewhere, case.truth))
     return found
-
-
-def in_frame(frame: np.ndarray, scan: Scan) -> Scan:
-    """Return a scan as an odometry places it whose frame lies at `frame` (3,) in the one before."""
-    track = Track(scan.track.times, composed(frame, scan.track.poses))
-    return replace(scan, points=transformed(frame, scan.points), track=track)
 
 
 def line(found: Sequence[Start]) -> str:

@@ -98,10 +98,11 @@ def make(pictures: Pictures) -> str:
     found[WORD] = fixes(by_chain[_THESIS][0], thesis_estimator())
     return joined(
         prose("""The vehicle makes the moves of the thesis in the basin: 4 m on x, 3 m on y and -8 m on x as the
-        odometry sees them, and 30 % more in truth. After each move the vehicle rests for a scan, which is matched
-        with the map of the scans before. `DISTRIBUTIONS` is the default, `THESIS` the thesis's own matcher
-        without the faults of its code, `GICP` Open3D's; all three get the same echoes. `thesis:=true` matches cleaned
-        clouds of a pulse of 1 m, as the thesis did. The thesis published one run."""),
+        odometry sees them, and 30 % more in truth. After each move the vehicle rests for a scan, which is
+        matched with the map of the scans before. `DISTRIBUTIONS` is what finds a scan in a map, `THESIS` the
+        thesis's own matcher without the faults of its code, `GICP` Open3D's; all three get the same echoes.
+        `thesis:=true` matches cleaned clouds of a pulse of 1 m, as the thesis did. The thesis published one
+        run."""),
         _picture(pictures, found[f"`{SHOWN.value}`"]),
         "Corrections of one run, x and y in metres, how far they are from the wanted ones, and the matcher's error:",
         table(["move", "wanted", "thesis", *found], _corrections(found)),

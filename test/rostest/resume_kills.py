@@ -58,13 +58,7 @@ def tell(kills: List[Kill]) -> None:
 def made_mission(seed: int) -> Mission:
     """Return a tour of a harbour with the truth, in the frame that a map which begins in odom has."""
     made = tour(SCANS, direction=0.05, seed=seed)
-    parameters = {
-        "estimator": "JOINT", "map_input": "MATCHED", "start_matching": True, "scale_deviation": 0.01,
-        "speed_deviation": 0.025, "rate_correlation_time": 12.0, "heading_deviation": 0.0175,
-        "direction_deviation": 0.1,
-        "free_scans": 8,
-    }  # fmt: skip
-    return Mission(made.scans, made.odometry, made.truth, KNOWN, parameters, SONAR_IN_BASE)
+    return Mission(made.scans, made.odometry, made.truth, KNOWN, {"free_scans": 8}, SONAR_IN_BASE)
 
 
 if __name__ == "__main__":

@@ -65,7 +65,7 @@ class JointSession:
         return self._add(scan, fix)
 
     def _add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
-        estimate = self.hypotheses.add(_moved(scan, self.T_map_odom), fix)
+        estimate = self.hypotheses.add(moved(scan, self.T_map_odom), fix)
         self._taken += 1
         self.scans.append(scan)
         if self._taken > _MOST_STORED:
@@ -82,8 +82,8 @@ class JointSession:
         stored: Mapping[str, np.ndarray],
     ) -> "JointSession":
         """Return a run that goes on after `scans`; see LiveSolver.resumed."""
-        moved = [_moved(scan, T_map_odom) for scan in scans]
-        return cls(Hypotheses.resumed(parameters, sonar_in_base, moved, stored), T_map_odom, list(scans), len(scans))
+        placed = [moved(scan, T_map_odom) for scan in scans]
+        return cls(Hypotheses.resumed(parameters, sonar_in_base, placed, stored), T_map_odom, list(scans), len(scans))
 
     @classmethod
     def begun(
@@ -238,7 +238,8 @@ def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
     return [scan.without_points(end) for end in ends if end < scan.reference_time]
 
 
-def _moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:
+def moved(scan: Scan, T_map_odom: np.ndarray) -> Scan:
+    """Return a scan as an odometry places it whose frame lies at `T_map_odom` (3,) in the one before."""
     track = _moved_track(scan.track, T_map_odom)
     return replace(scan, points=transformed(T_map_odom, scan.points), track=track)
 

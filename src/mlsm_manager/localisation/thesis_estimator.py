@@ -6,6 +6,7 @@ import numpy as np
 
 from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
+from mlsm_manager.localisation.joint_session import belief_at, expected_at
 from mlsm_manager.localisation.updates import CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import predicted, updated_by_heading
 from mlsm_manager.scan_matching.scan import Belief, MapCloud, MatchResult, Scan, corrected_points
@@ -84,10 +85,8 @@ class ThesisEstimator(Estimator):
 
     def _first_belief(self, scan: Scan) -> Belief:
         if self._expected is None:
-            theta = np.concatenate([scan.reference_pose, np.zeros(5)])
-            return Belief(scan.reference_time, theta, self.errors.covariance())
-        theta = np.concatenate([composed(self.correction, scan.reference_pose), self._expected.theta[3:]])
-        return Belief(scan.reference_time, theta, self._expected.covariance)
+            return belief_at(scan.reference_time, scan.reference_pose, self.errors)
+        return expected_at(self.correction, scan, self._expected)
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""

@@ -34,7 +34,6 @@ class LocalDistributions:
     """One planar distribution per block.
 
     mean: (n, 2) m in map. covariance: (n, 2, 2) m^2 of echoes about it.
-    deviation: m, how far echoes typically lie from the line that their neighbours make.
     """
 
     def __init__(self, blocks: Blocks) -> None:
@@ -49,7 +48,7 @@ class LocalDistributions:
         self.point_count = (near * blocks.count[neighbours]).sum(axis=1)
         close, broad = (_Window.around(blocks, distances, neighbours, width) for width in (window, 2.0 * window))
         self.mean = close.mean
-        self.deviation, self.covariance, thickness = _structure(close, broad)
+        self.covariance, thickness = _structure(close, broad)
         self.weight = (1.0 + thickness / _SURFACE_DEVIATION**2) ** -2
 
     def nearest(self, points: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
@@ -100,8 +99,8 @@ def _moments(weights: np.ndarray, neighbours: np.ndarray, blocks: Blocks) -> Tup
     return mean, covariance
 
 
-def _structure(close: _Window, broad: _Window) -> Tuple[float, np.ndarray, np.ndarray]:
-    """Return how far echoes typically lie from a line [m]; of each block covariance (n, 2, 2) and thickness (n,)."""
+def _structure(close: _Window, broad: _Window) -> Tuple[np.ndarray, np.ndarray]:
+    """Return covariance (n, 2, 2) and thickness (n,) of each block."""
     vectors = np.where((broad.turn < close.turn)[:, np.newaxis, np.newaxis], broad.vectors, close.vectors)
     across, members = close.along(vectors[:, :, 0]), close.members
     sure = (members >= 3.0) & (across < _SURFACE_DEVIATION**2)
@@ -114,4 +113,4 @@ def _structure(close: _Window, broad: _Window) -> Tuple[float, np.ndarray, np.nd
     along = np.maximum(broad.along(vectors[:, :, 1]), across)
     information = np.maximum(1.0 / along - _ALONG_MARGIN / broad.width**2, _UNBOUNDED**-2)
     values = np.column_stack([across, 1.0 / information])
-    return float(np.sqrt(typical)), np.einsum("iak,ik,ibk->iab", vectors, values, vectors), across
+    return np.einsum("iak,ik,ibk->iab", vectors, values, vectors), across

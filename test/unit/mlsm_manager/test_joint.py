@@ -6,21 +6,19 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour, without_positions
 
+from mlsm_manager.localisation.joint_session import moved
 from mlsm_manager.localisation.localiser import MapInput
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
-from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state, report_place
 from mlsm_manager.scan_matching.scan import MapCloud, Track
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.verdict import Verdict
-from node_support.geometry import composed, transformed
+from node_support.geometry import composed
 from node_support.health import Health, Level
 
 SCANS = tour(12).scans
-PARAMETERS = MlsmCoreParameters(
-    estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
-    speed_deviation=0.025, rate_correlation_time=12.0, heading_deviation=0.0175, size_x_meters=0.0, size_y_meters=0.0,
-)  # fmt: skip
+PARAMETERS = MlsmCoreParameters(size_x_meters=0.0, size_y_meters=0.0)
 HEADING = profile_values(OdometryKind.HEADING)
 
 
@@ -318,9 +316,7 @@ def test_where_somebody_points_at_the_vehicle_it_is_searched():
     shift, scan = np.array([30.0, -7.0, 0.4]), SCANS[6]
     pose = np.add(scan.reference_pose, (0.4, -0.4, 0.05))
     localiser.expect(pose, np.diag([0.25, 0.25, 0.07]), composed(shift, scan.reference_pose))
-    moved = replace(scan, points=transformed(shift, scan.points),
-                    track=Track(scan.track.times, composed(shift, scan.track.poses)))  # fmt: skip
-    found = localiser.take_scan(moved).scan
+    found = localiser.take_scan(moved(scan, shift)).scan
     assert found.accepted
     assert np.hypot(*(found.belief.theta[:2] - scan.reference_pose[:2])) < 0.3
 
@@ -330,10 +326,7 @@ def test_after_a_jump_in_time_and_of_the_odometry_the_vehicle_is_found_in_its_ma
     localiser, _ = localiser_after(9)
     before, shift = {tuple(cell) for cell in localiser.blocks.cells.tolist()}, np.array([12.0, -9.0, 0.4])
     localiser.notice_time(-3600.0)
-    tracks = [Track(scan.track.times, composed(shift, scan.track.poses)) for scan in SCANS[3:9]]
-    again = [replace(scan, points=transformed(shift, scan.points), track=track)
-             for scan, track in zip(SCANS[3:9], tracks)]  # fmt: skip
-    updates = [localiser.take_scan(scan).scan for scan in again]
+    updates = [localiser.take_scan(moved(scan, shift)).scan for scan in SCANS[3:9]]
     assert [update.accepted for update in updates] == [False] + [True] * 5
     assert np.hypot(*(updates[-1].belief.theta[:2] - SCANS[8].reference_pose[:2])) < 0.5
     assert sum(tuple(cell) not in before for cell in localiser.blocks.cells.tolist()) < 0.2 * len(before)

@@ -6,23 +6,17 @@ import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, TURN, selected, tour
 
-from mlsm_manager.localisation.localiser import MapInput
-from mlsm_manager.localisation.parameters import EstimatorName, MlsmCoreParameters
+from mlsm_manager.localisation.joint_session import moved
+from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.surface_map.map_file import map_bytes, map_of_bytes
-from node_support.geometry import composed, transformed
 
 pytestmark = pytest.mark.long
 
 HARBOUR = tour(14, direction=0.05)
 KILLED_AFTER = 9
 FREE_SCANS = 4
-PARAMETERS = MlsmCoreParameters(
-    estimator=EstimatorName.JOINT, map_input=MapInput.MATCHED, start_matching=True, scale_deviation=0.01,
-    speed_deviation=0.025, rate_correlation_time=12.0, heading_deviation=0.0175, direction_deviation=0.1,
-    size_x_meters=0.0,
-    size_y_meters=0.0, free_scans=FREE_SCANS,
-)  # fmt: skip
+PARAMETERS = MlsmCoreParameters(size_x_meters=0.0, size_y_meters=0.0, free_scans=FREE_SCANS)
 
 
 def new_localiser():
@@ -61,9 +55,7 @@ def resumed(stored, same_odometry=True):
 
 def begun_anew(scans, origin=(12.0, -9.0, 0.4)):
     """Return the scans as an odometry places them that counts from elsewhere: its frame lies at `origin` (3,)."""
-    origin = np.array(origin)
-    tracks = [Track(scan.track.times, composed(origin, scan.track.poses)) for scan in scans]
-    return [replace(scan, points=transformed(origin, scan.points), track=track) for scan, track in zip(scans, tracks)]
+    return [moved(scan, np.array(origin)) for scan in scans]
 
 
 def sector_of(scan, beams=14):
