@@ -64,7 +64,7 @@ class Fix:
     @property
     def correction(self) -> np.ndarray:
         """(3,) T_map_odom that the matcher found, accepted or not."""
-        return self.result.correction(self.scan)
+        return self.scan.correction_to(self.result.pose)
 
 
 def wanted(scan: Scan) -> np.ndarray:

@@ -16,7 +16,6 @@ from mlsm_manager.localisation.joint_session import (
     belief_at,
     belief_of,
     belief_of_match,
-    correction_of,
     expected_at,
     update_of,
 )
@@ -182,7 +181,7 @@ class Joint(Estimator):
         self._expected = None
         # Nobody knows how far the odometry strayed until now: clouds from before are left out.
         self._found_at = scan.start
-        self.correction = result.correction(scan)
+        self.correction = scan.correction_to(result.pose)
         self._start = np.sqrt(np.diag(result.covariance)[POSE])
         self.belief = belief_of_match(scan, result, self.errors)
         return ScanUpdate(scan, result, True, self.belief, forgotten=0 if session is None else session.turns_apart)
@@ -278,7 +277,7 @@ class Joint(Estimator):
 
     def _know(self, scan: Scan, session: JointSession) -> None:
         newest = session.solver.estimates[-1]
-        self.correction = correction_of(newest.T_map_base, scan)
+        self.correction = scan.correction_to(newest.T_map_base)
         self.belief = belief_of(newest, self.errors, session.solver.odometry.fading(newest.node))
 
     def _place(self, scan: Scan) -> ScanUpdate:

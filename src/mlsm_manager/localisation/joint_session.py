@@ -23,7 +23,7 @@ from mlsm_manager.scan_matching.scan_path import ERRORS, POSE, STATES
 from mlsm_manager.self_check.map_checks import AGREES, in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import odometry_decided, position_uncertainty
 from mlsm_manager.self_check.verdict import Verdict
-from node_support.geometry import composed, move_of, transformed, wrapped
+from node_support.geometry import composed, transformed
 
 _LONGEST_PAUSE = 2.0
 """Usual durations of a scan between two scans: fewer may be a turn that was lost."""
@@ -282,13 +282,6 @@ def expected_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Belief:
     """Return the belief that `correction` T_map_odom (3,) puts the end of a scan rightly, as sure as `expected`."""
     theta = np.concatenate([composed(correction, scan.reference_pose), expected.theta[POSE_COLUMNS:]])
     return Belief(scan.reference_time, theta, expected.covariance)
-
-
-def correction_of(T_map_base: np.ndarray, scan: Scan) -> np.ndarray:
-    """Return T_map_odom (3,) that puts the end of a scan to T_map_base (3,)."""
-    correction = move_of(scan.reference_pose, T_map_base)
-    correction[2] = wrapped(correction[2])
-    return correction
 
 
 def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float) -> ScanUpdate:

@@ -44,7 +44,7 @@ class ThesisEstimator(Estimator):
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Accept a match: insert the scan into the map, and take its pose over into the belief."""
         self.belief = result.belief
-        self.correction = result.correction(scan)
+        self.correction = scan.correction_to(result.pose)
         self._history.add(result.beam_times, result.beam_poses, scan.track, holds=True)
         self._insert_matched(corrected_points(scan, result), scan.times)
         return ScanUpdate(scan, result, True, self.belief)

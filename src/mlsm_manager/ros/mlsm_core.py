@@ -211,7 +211,7 @@ class MlsmCore:
         self._fix.show(update.scan, update.result, stamp_ns)
         if update.accepted:
             T_odom_base = self._odometry.matrix(update.scan.reference_time)
-            T_map_base = matrices(update.result.correction(update.scan)) @ T_odom_base
+            T_map_base = matrices(update.scan.correction_to(update.result.pose)) @ T_odom_base
             self._fix.publish(update.result, T_map_base, stamp_ns)
 
     def _publish_found(self, update: ScanUpdate) -> None:

@@ -53,7 +53,7 @@ class MatcherLimits:
     max_position_deviation: float = 0.5
     max_yaw_deviation: float = 0.1  # 6 deg: at 10 m a point is then a metre off
     min_gain_over_second: float = 3.0  # the best place is e^3, 20 times, as likely as the second-best
-    min_significance: float = 5.0  # chance alone leads by so much once in millions of scans
+    min_significance: float = 5.0  # chance leads by so much once in millions of scans; in canals nothing else refuses
     min_explained: float = 0.0  # near the expected place part of a scan may be of unknown water
     min_agreement: float = 0.8  # a wrong place seldom explains so much; boats and tide explain less at the right one
     same_place: float = 0.0  # near the expected place the next scan decides

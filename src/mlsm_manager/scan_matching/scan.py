@@ -172,6 +172,12 @@ class Scan:
         """(3,) T_odom_base at the reference time."""
         return self.track.at(self.reference_time)
 
+    def correction_to(self, T_map_base: np.ndarray) -> np.ndarray:
+        """Return the T_map_odom (3,) that puts the vehicle to T_map_base (3,) at the reference time."""
+        correction = move_of(self.reference_pose, T_map_base)
+        correction[2] = wrapped(correction[2])
+        return correction
+
 
 @dataclass(frozen=True)
 class MapCloud:
@@ -282,12 +288,6 @@ class MatchResult:
     def pose(self) -> np.ndarray:
         """(3,) T_map_base, x y [m] yaw [rad], at the scan's reference time."""
         return self.belief.theta[:3]
-
-    def correction(self, scan: Scan) -> np.ndarray:
-        """Return the (3,) T_map_odom at the scan's reference time that this pose means."""
-        correction = move_of(scan.reference_pose, self.pose)
-        correction[2] = wrapped(correction[2])
-        return correction
 
     def widened(self, covariance: np.ndarray) -> "MatchResult":
         """Return the match with an uncertain position, by a `covariance` (2, 2) m^2 besides its own."""

@@ -34,10 +34,10 @@ def test_scans_correct_the_odometry_and_make_the_map():
 
 def test_the_correction_moves_to_a_fix_within_the_blend_time():
     localiser, taken = localiser_after(3)
-    end, pose = taken[-1].scan.scan.reference_time, taken[-1].scan.scan.reference_pose
-    for time in (end, end + 2.0):
-        correction = localiser.following.correction(time, pose)
-    np.testing.assert_allclose(correction, taken[-1].scan.result.correction(taken[-1].scan.scan), atol=0.05)
+    scan, result = taken[-1].scan.scan, taken[-1].scan.result
+    for time in (scan.reference_time, scan.reference_time + 2.0):
+        correction = localiser.following.correction(time, scan.reference_pose)
+    np.testing.assert_allclose(correction, scan.correction_to(result.pose), atol=0.05)
 
 
 @with_every_estimator

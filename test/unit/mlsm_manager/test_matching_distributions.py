@@ -168,7 +168,7 @@ def test_an_unmatched_scan_keeps_the_priors_pose():
 def test_the_correction_takes_the_odometrys_pose_to_the_matched_one():
     scan = scan_of(harbour(), still((1.0, -0.5, 0.3)), still((0.3, 0.2, 0.0)))
     result = match(scan, map_of(harbour()), [1.0, -0.5, 0.3])
-    x, y, yaw = result.correction(scan)
+    x, y, yaw = scan.correction_to(result.pose)
     turned = np.array([x + np.cos(yaw) * 0.3 - np.sin(yaw) * 0.2, y + np.sin(yaw) * 0.3 + np.cos(yaw) * 0.2, yaw])
     np.testing.assert_allclose(turned, result.pose, atol=1e-9)
 
