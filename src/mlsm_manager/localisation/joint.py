@@ -22,8 +22,9 @@ from mlsm_manager.localisation.joint_session import (
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
+from mlsm_manager.odometry.mending import ReportedMotion
 from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted, updated_by_heading
-from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, ReportedMotion, Scan, Track
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource

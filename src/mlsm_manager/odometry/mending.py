@@ -1,5 +1,5 @@
-"""A recorded odometry mended where it says of itself that it was wrong: held poses, steps of compass and position, and
-poses that tremble.
+"""What an odometry says of itself: how far it changed, and where a recorded one was wrong, which is mended: held poses,
+steps of compass and position, and poses that tremble.
 """
 
 from typing import Iterator, List, NamedTuple, Tuple
@@ -22,6 +22,53 @@ _TURNS = 200  # between poses, that show whether a heading is measured
 _MOSTLY, _FEWEST = 0.5, 20  # share of poses that repeat the one before, and others besides, where an odometry repeats
 _SLOW = 0.5  # s: what is repeated for less is as good as told evenly
 _TO_AND_FRO = 0.03  # share of neighbouring turns of a measured heading that have opposite signs
+_UNMOVED = 0.05  # m: a position that moves by less never changed, but for rounding and lever arms of a tilting base
+_UNTURNED = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more
+
+
+class ReportedMotion:
+    """How far T_odom_base changed since it was first known: what an odometry tells of itself.
+
+    extent: m, of the positions along x or y. turned: rad, between the most different headings.
+    """
+
+    def __init__(self) -> None:
+        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
+        self._first_yaw = np.nan
+
+    def learn(self, track: Track) -> None:
+        """Learn what was reported on a track."""
+        poses = track.poses.copy()
+        if np.isnan(self._first_yaw):
+            self._first_yaw = poses[0, 2]
+        poses[:, 2] = wrapped(poses[:, 2] - self._first_yaw)
+        self._low = np.minimum(self._low, poses.min(axis=0))
+        self._high = np.maximum(self._high, poses.max(axis=0))
+
+    @property
+    def extent(self) -> float:
+        """By how much positions changed, m."""
+        return float(np.max(self._high[:2] - self._low[:2]))
+
+    @property
+    def turned(self) -> float:
+        """By how much the heading changed, rad; at most a turn."""
+        return float(self._high[2] - self._low[2])
+
+    @property
+    def has_positions(self) -> bool:
+        """Whether positions changed."""
+        return self.extent > _UNMOVED
+
+    @property
+    def has_headings(self) -> bool:
+        """Whether the heading changed."""
+        return self.turned > _UNTURNED
+
+    @property
+    def only_turns(self) -> bool:
+        """Whether headings changed, and positions never did: nobody reports these."""
+        return self.has_headings and not self.has_positions
 
 
 class Mended(NamedTuple):
