@@ -10,8 +10,9 @@ from geometry_msgs.msg import PoseWithCovarianceStamped
 from graph import LONG_PATIENCE, Diagnostics, Inbox, run
 from messages import place, publisher, true_places, variance
 from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
 
-from underwater_map_construction.msg import SonarScanLine
+from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 SILENCE = 120.0, 240.0  # s into the run
 KNOWN = 2.0  # m told, from which on the place is known
@@ -19,14 +20,16 @@ FARTHEST = 3.0  # deviations that both fixes tell, of the way between them from 
 
 
 class Silence(unittest.TestCase):
-    """Hands the simulated head's beams on, but for those of the silence."""
+    """Hands the simulated head's beams on, but for those of the silence, and their echoes to the simulator."""
 
     def test_the_vehicle_is_found_again(self) -> None:
         """The first fix that claims to be good is as near the truth as it tells, and the node says that it is found."""
         truth, fixes = Inbox("/ground_truth", Odometry), Inbox("/MLSM/pose", PoseWithCovarianceStamped)
         diagnostics = Diagnostics()
         self.heard = publisher("/heard", SonarScanLine)
-        self.first = np.nan
+        self.paced = publisher("/paced", StampedIntensityCloud)
+        self.first, self.silent = np.nan, False
+        rospy.Subscriber("/sonar/scan/echoes", StampedIntensityCloud, self.paced.publish, queue_size=10)
         rospy.Subscriber("/sonar/raw", SonarScanLine, self._hand_on, queue_size=1000)
         diagnostics.wait_for("mlsm_core", "times found again after a silence", 1, LONG_PATIENCE)
         found = fixes.wait_for(lambda fix: self._seconds(fix) > SILENCE[1] and variance(fix) < KNOWN**2, LONG_PATIENCE)
@@ -41,6 +44,11 @@ class Silence(unittest.TestCase):
         self.first = np.nanmin([self.first, beam.header.stamp.to_sec()])
         if not SILENCE[0] <= self._seconds(beam) < SILENCE[1]:
             self.heard.publish(beam)
+        elif not self.silent:
+            self.silent = True
+            # The simulator would wait a minute for the echoes of beams that nobody heard.
+            end = rospy.Time.from_sec(self.first + SILENCE[1])
+            self.paced.publish(StampedIntensityCloud(header=Header(stamp=end)))
 
     def _seconds(self, message: Any) -> float:
         return message.header.stamp.to_sec() - self.first
