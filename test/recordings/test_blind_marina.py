@@ -48,3 +48,9 @@ def test_positions_are_believed_in_a_canal_though_scans_of_a_shorter_path_lie_on
     recording("marina_whole_blind.bag")
     short_at_first = range_told(source("canal", 600.0), at=0.0, share=0.4, seconds=300.0)
     assert mapped_as(short_at_first, "--refine").odometry.kind is OdometryKind.AUTO
+
+
+def test_a_canal_shows_no_iron_beside_a_compass_alone_that_errs_as_usual(recording):
+    recording("marina_whole_blind.bag")
+    found = mapped_as(source("canal compass", 600.0), "--refine", "--odometry", "heading")
+    assert found.findings.trust.causes == []

@@ -35,6 +35,7 @@ from node_support.geometry import move_of, rotated, transformed
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 _NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
 _NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
+_NATS_CIRCLE = 20.0  # of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22
 _SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
@@ -202,6 +203,8 @@ def _needed(found: MotionFindings, fault: Fault) -> float:
 
     Distances may change at any moment: where half of the circle was heard, a wrong change gained 6.4.
     """
+    if found.is_alone and fault.kind is FaultKind.CIRCLE:
+        return _NATS_CIRCLE
     if found.is_alone and fault.kind in _SUDDEN:
         return _NATS_ALONE
     return NAMED_FROM if fault.kind is FaultKind.DISTANCES else _NATS
