@@ -22,6 +22,7 @@ from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
     halves_agree,
+    mount_told,
     odometry_decided,
     position_uncertainty,
 )
@@ -110,7 +111,7 @@ class _BestPath(NamedTuple):
     """A path as well as a run knows it. poses: (m, 3) T_map_base at the times of the replay. solution: of the solver.
 
     times: (k,) s of its nodes, with places (k, 2) [m], covariances (k, 2, 2) [m^2], and deviations (k,) [m] that are
-    expected whatever the water tells.
+    expected whatever the water tells. mounts: rad, by how much the sonar may be turned where no course tells it.
     """
 
     poses: np.ndarray
@@ -119,6 +120,7 @@ class _BestPath(NamedTuple):
     places: np.ndarray
     covariances: np.ndarray
     expected: np.ndarray
+    mounts: float = 0.0
 
 
 def _live_path(replayed: Replayed) -> _BestPath:
@@ -136,7 +138,7 @@ def _refined_path(refined: Refined, solver: LiveSolver) -> _BestPath:
     directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
     expected = expected_deviations(places - places[0], lengths, directions)
     covariances = refined.batch.pose_covariances[:, :2, :2] + refined.motion.spread(times)
-    return _BestPath(refined.poses, refined.solution, times, places, covariances, expected)
+    return _BestPath(refined.poses, refined.solution, times, places, covariances, expected, refined.motion.mounts)
 
 
 def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> List[Verdict]:
@@ -154,6 +156,7 @@ def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> Li
         *in_submaps(turns.times, turns.apart),
         as_expected(before.names, before.values, before.deviations, calibration.values),
         *_halves(solver),
+        *mount_told(best.mounts),
         *odometry_decided(replayed.hypotheses.doubt),
     ]
 

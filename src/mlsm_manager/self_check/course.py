@@ -38,6 +38,11 @@ class CourseFound(NamedTuple):
         """What the deviation does not explain of the turn, rad."""
         return float(np.sqrt(max(self.turn**2 - self.deviation**2, 0.0)))
 
+    @property
+    def hidden(self) -> float:
+        """By how much a sonar may be turned that seems turned so beside a DVL, whose own turn may hide more, rad."""
+        return float(np.hypot(self.turn, self.deviation))
+
 
 NOT_TOLD = CourseFound(0.0, np.inf)
 

@@ -58,7 +58,7 @@ class MotionFindings:
 
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
-    nodes. mounts: rad, deviation of the direction in which sonar and odometry are mounted, where nothing tells it.
+    nodes. mounts: rad, by how much the sonar may be turned where no course tells it.
     is_course_told: whether the vehicle has a usual course, which shows how the sonar is turned.
     """
 
@@ -91,9 +91,9 @@ class MotionFindings:
         course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
         # Where no course tells which of them is turned, it may be the sonar alone.
         direction = NOT_TOLD if course.is_told else self._direction
-        turn, mounts = direction if direction.is_told else (course.unexplained, 0.0)
+        mounts = direction.hidden if direction.is_told else 0.0
         gone = places - places[0]
-        aside = rotated(gone, np.full(len(gone), turn)) - gone
+        aside = rotated(gone, np.full(len(gone), mounts or course.unexplained)) - gone
         causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
         return replace(self, causes=causes, apart=apart, mounts=mounts, is_course_told=course.is_told)

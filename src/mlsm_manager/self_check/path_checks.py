@@ -140,6 +140,18 @@ def position_uncertainty(
     return Verdict("position uncertainty", float(grown[worst]), limit, text, doubtful=doubtful, question=question)
 
 
+def mount_told(mounts: float) -> Tuple[Verdict, ...]:
+    """Return that nothing tells how the sonar is turned; nothing where something does.
+
+    mounts: rad, by how much it may be, by the stated deviations; 0 where a usual course tells it.
+    """
+    if not mounts:
+        return ()
+    text = f"no usual course tells how the sonar is turned; {np.degrees(mounts):.0f} deg are in the stated deviations"
+    question = "Does the vehicle go as a sonar sees it that is mounted as tf says?"
+    return (Verdict("direction of the sonar", np.nan, 0.0, text, question=question),)
+
+
 def per_minute(times: np.ndarray, deviations: np.ndarray) -> np.ndarray:
     """Return the mean of `deviations` (m,) in each minute from the first of `times` (m,) [s] on; NaN for a gap."""
     minutes = ((times - times[0]) // 60.0).astype(int)

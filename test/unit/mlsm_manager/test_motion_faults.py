@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
-from benchmarks.faults import shortened, source
+from benchmarks.faults import outcome, shortened, source
 from benchmarks.harness import mapped_as
 from made_recordings import touring
 
@@ -171,6 +171,15 @@ def test_nothing_is_named_where_nothing_is_wrong():
 def test_distances_in_feet_do_not_make_the_moves_of_a_vehicle_that_strafes_look_mirrored():
     in_feet = broken.odometry_scaled(source("turning", 600.0), 3.28)
     assert mapped_as(in_feet, "--refine").findings.trust.causes == []
+
+
+@pytest.mark.long
+def test_what_a_turned_dvl_hides_of_a_turned_sonar_is_stated():
+    strafing = source("turning", 600.0)  # its DVL is turned by 10 degrees
+    whole, turned = (mapped_as(one, "--refine") for one in (strafing, broken.mount_turned(strafing, 14.0)))
+    assert outcome(turned, whole, named="").covered == 1.0
+    assert "NOT MEASURED" in turned.findings.trust.line
+    assert "direction of the sonar" in turned.findings.trust.line
 
 
 @pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1), (90.0, 1), (-179.0, 1)])

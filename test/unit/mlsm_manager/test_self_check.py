@@ -14,6 +14,7 @@ from mlsm_manager.self_check.path_checks import (
     against_odometry,
     as_expected,
     halves_agree,
+    mount_told,
     per_minute,
     position_uncertainty,
     settings_agree,
@@ -123,6 +124,17 @@ def test_a_deviation_that_compass_and_lengths_explain_is_no_doubt():
     stated = TIMES * 0.01
     assert not position_uncertainty(TIMES, np.hypot(stated, 2.0), stated).fires
     assert position_uncertainty(TIMES, np.hypot(stated, 6.0), stated).fires
+
+
+@pytest.mark.parametrize(
+    ("degrees", "lines"),
+    [
+        (0.0, []),
+        (6.2, ["not measured: no usual course tells how the sonar is turned; 6 deg are in the stated deviations"]),
+    ],
+)
+def test_the_direction_of_the_sonar_is_not_measured_where_no_course_tells_it(degrees, lines):
+    assert [one.line() for one in mount_told(np.radians(degrees))] == lines
 
 
 def test_deviations_are_told_per_minute():
