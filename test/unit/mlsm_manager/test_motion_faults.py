@@ -190,6 +190,18 @@ def test_a_sonar_is_turned_where_the_vehicle_never_goes_ahead(turn, named):
     assert len(course_causes(found)) == named
 
 
+def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_once():
+    lasting = np.repeat(np.radians([0.0, 9.0, -12.0, 4.0, 10.0, -7.0, -3.0]), 4)
+    changing = lasting.reshape(7, 4).T.ravel()
+
+    def deviation(courses):
+        places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
+        poses = np.vstack([np.zeros(3), np.column_stack([places, np.zeros(len(courses))])])
+        return course_of(Track(10.0 * np.arange(len(poses)), poses)).deviation
+
+    assert deviation(lasting) > 1.2 * deviation(changing)
+
+
 def test_a_vehicle_that_goes_back_tells_nothing_of_the_mount_where_its_odometry_does():
     path = Track(WHOLE.track.times, WHOLE.track.poses + np.radians([0.0, 0.0, 180.0]))
     assert course_causes(course_of(path)) == []
