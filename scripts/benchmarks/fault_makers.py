@@ -69,6 +69,15 @@ def odometry_freezes(recording: Recording, at: float, seconds: float = np.inf, g
     return with_odometry(recording, integrated(poses[0], steps))
 
 
+def odometry_hangs(recording: Recording, at: float, seconds: float) -> Recording:
+    """Let the pose stay for some seconds; then the heading is right, and positions go on from where they stood."""
+    poses, stands = recording.track.poses.copy(), after(recording, at) & ~after(recording, at + seconds)
+    moves = np.diff(poses[:, :2], axis=0) * ~stands[1:, np.newaxis]
+    poses[1:, :2] = poses[0, :2] + np.cumsum(moves, axis=0)
+    poses[stands, 2] = poses[np.argmax(stands), 2]
+    return with_odometry(recording, poses)
+
+
 def odometry_missing(recording: Recording, at: float, seconds: float) -> Recording:
     """Leave out the odometry of some seconds, and with it the beams that cannot be placed then."""
     start, track = recording.track.times[0] + at, recording.track

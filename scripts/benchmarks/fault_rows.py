@@ -72,6 +72,7 @@ ROWS = (
     FaultRow("odometry frozen {} s, then right", broken.odometry_freezes, _FROZEN, "seconds", 60.0, begins=True,
              others={"goes_on": False}),
     FaultRow("odometry frozen to the end", broken.odometry_freezes, _FROZEN, begins=True),
+    FaultRow("odometry hangs {} s", broken.odometry_hangs, "hung|held|stood|frozen", "seconds", 45.0, begins=True),
     FaultRow("odometry missing {} s", broken.odometry_missing, "", "seconds", 60.0, begins=True),
     FaultRow("odometry {} times as long", broken.odometry_scaled, _LENGTHS, "factor", 0.9, True),
     FaultRow("odometry {} times as long", broken.odometry_scaled, _LENGTHS, "factor", 1.1, True),

@@ -2,7 +2,7 @@
 steps of compass and position, and poses that tremble.
 """
 
-from typing import Iterator, List, NamedTuple, Tuple
+from typing import Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 import scipy.sparse
@@ -18,6 +18,8 @@ _STANDS_FOR = 10.0  # s of equal poses: longer than any odometry waits between t
 _COURSE = 20.0  # s before and after a step in which the vehicle shows which way it goes against its heading
 _GOES = 1.0  # m in these: less does not tell a course
 _FOLLOWS = 0.5  # share of a step of the heading, halfway between a course that turns against it and one that does not
+_ANY_HEADING = np.radians(60.0)  # scans that are turned by more lie on nothing: marinas 20 to 40, strafing 90 to 150
+_APART = 2.0  # s between the stretches that tell
 _TURNS = 200  # between poses, that show whether a heading is measured
 _MOSTLY, _FEWEST = 0.5, 20  # share of poses that repeat the one before, and others besides, where an odometry repeats
 _SLOW = 0.5  # s: what is repeated for less is as good as told evenly
@@ -72,14 +74,14 @@ class ReportedMotion:
 
 
 class Mended(NamedTuple):
-    """track: without what no vehicle does. steps: that were left out. held: s, beginnings and ends of poses that were
-    held until they jumped to where the vehicle was. stuck: s, likewise, of headings; they stay.
+    """track: without what no vehicle does. steps: that were left out. stuck: s, beginnings and ends of headings that
+    stood while positions went on; they stay. untold: s, likewise, of stretches in which not even the heading is known.
     """
 
     track: Track
     steps: List[Step]
-    held: List[Tuple[float, float]]
     stuck: List[Tuple[float, float]]
+    untold: List[Tuple[float, float]]
 
 
 def mended(track: Track, limits: MotionLimits) -> Mended:
@@ -87,12 +89,27 @@ def mended(track: Track, limits: MotionLimits) -> Mended:
     stuck = stuck_headings(track)
     track, repeats = _without_repeats(track)
     track, trembling = with_trembling_smoothed(track)
-    track, held = _with_holds_bridged(track, limits)
     track, compass = _with_headings_mended(track, limits)
     odometry = ContinuousOdometry(limits)
     odometry.take(track)
     steps = sorted([*repeats, *trembling, *compass, *odometry.steps], key=lambda step: step.time)
-    return Mended(odometry.followed(track), steps, held, stuck)
+    return Mended(odometry.followed(track), steps, stuck, list(_untold(track, steps)))
+
+
+def _untold(track: Track, steps: Sequence[Step]) -> Iterator[Tuple[float, float]]:
+    """Yield the long steps that a vehicle which turns as usual may have begun and ended with any heading between."""
+    for step in steps:
+        if step.is_too_long and _bridged_apart(track, step.time - step.begin) > _ANY_HEADING:
+            yield step.begin, step.time
+
+
+def _bridged_apart(track: Track, seconds: float) -> float:
+    """Return how far [rad] headings usually lie from those that are bridged evenly over `seconds`."""
+    starts = np.arange(track.times[0], track.times[-1] - seconds, _APART)
+    shares = np.linspace(0.0, 1.0, 5)
+    yaws = track.at(starts[:, np.newaxis] + shares * seconds)[..., _YAW]
+    turned = wrapped(yaws[:, -1:] - yaws[:, :1])
+    return float(np.median(np.abs(wrapped(yaws - yaws[:, :1] - shares * turned)).max(axis=1))) if len(starts) else 0.0
 
 
 def standing_stretches(track: Track, first_column: int = 0) -> Iterator[Tuple[int, int]]:
@@ -136,19 +153,10 @@ def _without_repeats(track: Track) -> Tuple[Track, List[Step]]:
         return track, []
     kept = track.chosen(~again)
     seconds = float(np.median(np.diff(kept.times)))
-    return (kept, [Step(StepKind.REPEATED, float(track.times[0]), seconds, 0.0)]) if seconds > _SLOW else (track, [])
-
-
-def _with_holds_bridged(track: Track, limits: MotionLimits) -> Tuple[Track, List[Tuple[float, float]]]:
-    """Leave out poses that stood until they jumped as far as a vehicle goes meanwhile."""
-    impossible, kept, held = set(impossible_steps(track, limits).tolist()), np.ones(len(track.times), dtype=bool), []
-    for first, last in standing_stretches(track):
-        if last + 1 in impossible:
-            seconds = float(track.times[last] - track.times[first])
-            if np.hypot(*(track.poses[last + 1] - track.poses[last])[:2]) <= limits.max_speed * seconds:
-                kept[first + 1 : last + 1] = False
-                held.append((float(track.times[first]), float(track.times[last])))
-    return track.chosen(kept), held
+    if seconds <= _SLOW:
+        return track, []
+    begin = float(track.times[0])
+    return kept, [Step(StepKind.REPEATED, begin, begin + seconds, 0.0, 0.0)]
 
 
 def _with_headings_mended(track: Track, limits: MotionLimits) -> Tuple[Track, List[Step]]:
@@ -163,7 +171,7 @@ def _with_headings_mended(track: Track, limits: MotionLimits) -> Tuple[Track, Li
             poses = track.poses.copy()
             poses[number:, 2] -= turn
             track = track.with_poses(poses)
-            steps.append(Step(StepKind.COMPASS, time, float(np.hypot(*move[:2])), turn))
+            steps.append(Step(StepKind.COMPASS, time, time, float(np.hypot(*move[:2])), turn))
     return track, steps
 
 
@@ -199,11 +207,14 @@ def with_trembling_smoothed(track: Track) -> Tuple[Track, List[Step]]:
         poses[own, axis] = smoothed[own]
     steps, moves, turns = [], trembles[:, :2].any(axis=1), trembles[:, 2]
     if moves.any():
-        size = float(np.median(np.hypot(*noise[moves, :2].T)) / np.sqrt(2.0))
-        steps.append(Step(StepKind.SCATTERS, float(track.times[np.argmax(moves)]), size, 0.0))
+        size, time = (
+            float(np.median(np.hypot(*noise[moves, :2].T)) / np.sqrt(2.0)),
+            float(track.times[np.argmax(moves)]),
+        )
+        steps.append(Step(StepKind.SCATTERS, time, time, size, 0.0))
     if turns.any():
-        turn = float(np.median(noise[turns, 2]))
-        steps.append(Step(StepKind.TREMBLES, float(track.times[np.argmax(turns)]), 0.0, turn))
+        turn, time = float(np.median(noise[turns, 2])), float(track.times[np.argmax(turns)])
+        steps.append(Step(StepKind.TREMBLES, time, time, 0.0, turn))
     return (track.with_poses(poses), steps) if steps else (track, [])
 
 

@@ -48,33 +48,42 @@ class StepKind(Enum):
     RESTARTED = "odometry started again from zero, {size:.1f} m off"
     COMPASS = "compass stepped by {turn:.0f} deg"
     TREMBLES = "the compass trembles by about {turn:.0f} deg"
-    REPEATED = "the odometry repeats each pose for about {size:.1f} s"
+    REPEATED = "the odometry repeats each pose for about {seconds:.1f} s"
     SCATTERS = "reported positions tremble by about {size:.1f} m"
     STALLED = "odometry stalled, and missed {size:.1f} m and {turn:.0f} deg"
     POSITIONS = "positions stood while the heading went on, and missed {size:.1f} m"
+    HELD = "odometry held for {seconds:.0f} s, and then right again,"
+    HUNG = "odometry hung for {seconds:.0f} s, and missed how far the vehicle went,"
 
 
 _LONGEST_STALL = 30.0  # s: a vehicle may have done anything meanwhile
+_LONGEST_HELD = 300.0  # s: nobody keeps poses for longer to see how a stretch of equal ones ends
 _MAY_STAND = 10.0  # s: poses that are equal for longer may be those of a vehicle that stands, if it came to a stop
 
 
 @dataclass(frozen=True)
 class Step:
-    """An impossible step. time: s, of the first pose after it. size: m. turn: rad.
+    """An impossible step. begin, time: s, of the pose before it and of the first one after it. size: m. turn: rad.
 
     lost: s, in which nothing tells how the vehicle went.
     """
 
     kind: StepKind
+    begin: float
     time: float
     size: float
     turn: float
     lost: float = 0.0
 
     @property
+    def is_too_long(self) -> bool:
+        """Whether the vehicle may have done anything meanwhile."""
+        return self.lost >= _LONGEST_STALL
+
+    @property
     def text(self) -> str:
         """What happened, without the time."""
-        return self.kind.value.format(size=self.size, turn=np.degrees(self.turn))
+        return self.kind.value.format(size=self.size, turn=np.degrees(self.turn), seconds=self.time - self.begin)
 
 
 class ContinuousOdometry:
@@ -100,7 +109,6 @@ class ContinuousOdometry:
         """Forget everything, because time jumped."""
         self.steps: List[Step] = []
         self.trembling: List[Step] = []
-        self._begins: List[float] = []
         self._starts = [-np.inf]
         self._fixes = [np.zeros(3)]
         self._newest = Track(np.zeros(1), np.zeros((1, 3)))
@@ -122,11 +130,12 @@ class ContinuousOdometry:
             known = len(self._newest.times)
         else:
             known = 1
-        stalled = {stall.end: stall for stall in stalls(track)}
-        for number in sorted({*impossible_steps(track, self._limits), *stalled}):
+        impossible = impossible_steps(track, self._limits).tolist()
+        stalled = {stall.end: stall for stall in stalls(track, impossible, self._limits.max_speed)}
+        for number in sorted({*impossible, *stalled}):
             if number >= known and not self._stood_until(*track.times[number - 1 : number + 1]):
                 if number in stalled:
-                    self._bridge(track, stalled[number])
+                    self._bridge(track, stalled[number], track.times[known - 1])
                 else:
                     self._leave_out(track, number)
         self._newest = track.chosen(slice(min(_oldest_that_tells(track), max(len(track.times) - _AROUND, 0)), None))
@@ -136,17 +145,21 @@ class ContinuousOdometry:
         """Return whether a clock that had stood went on between two times [s]."""
         return any(before < end and after > begin for begin, end in list(self.stood))
 
-    def _bridge(self, track: Track, stall: "Stall") -> None:
-        """Let the odometry go on while it stalled; where it jumped afterwards, by as much as it jumped."""
+    def _bridge(self, track: Track, stall: "Stall", taken_until: float) -> None:
+        """Let the odometry go on while it stalled; where it jumped afterwards, by as much as it jumped.
+
+        Poses until `taken_until` [s] were taken for true; what goes on as before is only lost since.
+        """
         before, after = track.poses[stall.begin], track.poses[stall.end]
-        step, missed = seen_from(before, after), stall.missed.copy()
+        step, missed, lost = seen_from(before, after), stall.missed.copy(), stall.lost
         if np.hypot(*(step - stall.usual)[:2]) > LEAST_STEP[0]:
-            missed[:2] = step[:2]
+            missed[:2], lost = step[:2], 0.0
+        if stall.kind is not StepKind.HUNG:
+            lost = min(lost, float(track.times[stall.end]) - taken_until)
         if abs(wrapped(step[2] - stall.usual[2])) > LEAST_STEP[1]:
             missed[2] = step[2]
         self._expected = composed(composed(self._fixes[-1], before), missed)
-        times, jumped = track.times[[stall.begin, stall.end]], not np.array_equal(missed[:2], stall.missed[:2])
-        self._put(stall.kind, times, missed, after, 0.0 if jumped else float(times[1] - times[0]))
+        self._put(stall.kind, track.times[[stall.begin, stall.end]], missed, after, lost)
 
     def _leave_out(self, track: Track, number: int) -> None:
         """Let the odometry go on without the step to pose `number`."""
@@ -165,8 +178,7 @@ class ContinuousOdometry:
         self, kind: StepKind, times: np.ndarray, step: np.ndarray, after: np.ndarray, lost: float = 0.0
     ) -> None:  # fmt: skip
         """Put the pose `after` a step (3,) to where it is expected; times: (2,) s, of the poses before and after it."""
-        self.steps.append(Step(kind, float(times[1]), float(np.hypot(*step[:2])), float(wrapped(step[2])), lost))
-        self._begins.append(float(times[0]))
+        self.steps.append(Step(kind, *times.tolist(), float(np.hypot(*step[:2])), float(wrapped(step[2])), lost))
         # The fix comes first: others search the starts.
         self._fixes.append(move_of(after, self._expected))
         self._starts.append(float(times[1]))
@@ -191,28 +203,29 @@ class ContinuousOdometry:
         """Return T_continuous_base of a track that was taken, without what was interpolated within a step."""
         if not self.steps:
             return track
-        within, lost = np.zeros(len(track.times), dtype=bool), track.lost.copy()
-        for begin, step in zip(self._begins, self.steps):
-            within |= (track.times > begin) & (track.times < step.time)
+        kept, lost = np.ones(len(track.times), dtype=bool), track.lost.copy()
+        for step in list(self.steps):
+            kept &= (track.times <= step.begin) | (track.times >= step.time)
             lost[track.times == step.time] += step.lost
-        if within.all():
+        if not kept.any():
             return track
         mended = replace(track, poses=composed(self.fixes(track.times), track.poses), lost=lost)
-        return mended.chosen(~within)
+        return mended.chosen(kept)
 
 
 def _oldest_that_tells(track: Track) -> int:
     """Return from which pose on a track tells whether its end is a stall, and how the vehicle went just before."""
     stands = np.flatnonzero(_moves(track))[-1:] + 1
     begin = track.times[stands[0]] if stands.size else track.times[0]
-    longest = track.times[-1] - _LONGEST_STALL
+    longest = track.times[-1] - _LONGEST_HELD
     return int(np.searchsorted(track.times, max(begin, longest) - _BEFORE))
 
 
 class Stall(NamedTuple):
     """begin, end: of the poses, the first that stood and the first after it. missed, usual: (3,) in base_link, how the
     vehicle went meanwhile, and in a step as long as the last one, if it went on as before. kind: STALLED where the
-    heading stood too, else POSITIONS.
+    heading stood too, else POSITIONS; HELD or HUNG where it jumped afterwards. lost: s, in which nothing tells how the
+    vehicle went.
     """
 
     begin: int
@@ -220,15 +233,23 @@ class Stall(NamedTuple):
     missed: np.ndarray
     usual: np.ndarray
     kind: StepKind
+    lost: float
 
 
-def stalls(track: Track) -> List[Stall]:
+def stalls(track: Track, impossible: Sequence[int], max_speed: float) -> List[Stall]:
     """Return where the position stood for seconds, though no vehicle stops and starts so suddenly; without positions,
-    where the heading did.
+    where the heading did. impossible: numbers of poses that no vehicle reaches from the one before.
     """
-    same = stretches(~_moves(track))
-    found = (_stall(track, first, last) for first, last in same if last + 1 < len(track.times))
-    return [stall for stall in found if stall is not None]
+    jumps = [(first, last) for first, last in stretches(_stands(track)) if last + 1 in impossible]
+    held = [stall for stall in (_held(track, *one, max_speed) for one in jumps) if stall is not None]
+    ends = {len(track.times), *(stall.end for stall in held)}
+    others = (_stall(track, *one) for one in stretches(~_moves(track)) if one[1] + 1 not in ends)
+    return [*held, *(stall for stall in others if stall is not None)]
+
+
+def _stands(track: Track) -> np.ndarray:
+    """Return which steps (m - 1,) change nothing."""
+    return (np.diff(track.poses, axis=0) == 0.0).all(axis=1)
 
 
 def _moves(track: Track) -> np.ndarray:
@@ -237,23 +258,50 @@ def _moves(track: Track) -> np.ndarray:
     return (moves[:, :2] if moves[:, :2].any() else moves[:, 2:]).any(axis=1)
 
 
-def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
-    times, poses, start = track.times, track.poses, int(np.searchsorted(track.times, track.times[first] - _BEFORE))
-    kind = StepKind.POSITIONS if np.ptp(poses[first : last + 1, 2]) else StepKind.STALLED
-    if not _SHORTEST_STALL <= times[last] - times[first] < _LONGEST_STALL or first - start < 2:
+def _held(track: Track, first: int, last: int, max_speed: float) -> Optional[Stall]:
+    """Return the stall of a pose that stood and then jumped, if only as far as a vehicle goes meanwhile.
+
+    Where only the heading jumped nothing tells how far the vehicle went.
+    """
+    seconds, poses = float(track.times[last] - track.times[first]), track.poses
+    missed = seen_from(poses[last], poses[last + 1])
+    distance = float(np.hypot(*missed[:2]))
+    if not _MAY_STAND <= seconds < _LONGEST_HELD or distance > max_speed * seconds:
         return None
-    steps, step = seen_from(poses[start:first], poses[start + 1 : first + 1]), times[last + 1] - times[last]
-    rates = steps / np.diff(times[start : first + 1])[:, np.newaxis]
+    is_right = distance > LEAST_STEP[0] or not np.ptp(poses[:, :2], axis=0).any()
+    kind, lost = (StepKind.HELD, 0.0) if is_right else (StepKind.HUNG, seconds)
+    return Stall(first, last + 1, missed, missed, kind, lost)
+
+
+def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
+    times, poses, rates = track.times, track.poses, _rates_before(track, first)
+    kind = StepKind.POSITIONS if np.ptp(poses[first : last + 1, 2]) else StepKind.STALLED
+    if not _SHORTEST_STALL <= times[last] - times[first] < _LONGEST_STALL or len(rates) < 2:
+        return None
+    step, seconds = times[last + 1] - times[last], float(times[last + 1] - times[first])
     usual, again = np.median(rates, axis=0), seen_from(poses[last], poses[last + 1]) / step
-    stops = (_speeds(usual) > _GOES) & (_speeds(rates[-1]) > _AS_BEFORE * _speeds(usual))
+    stops = _stops_at_once(rates)
     if kind is StepKind.POSITIONS:
         missed = _steered(usual * stops[0], again, times[first : last + 2], poses[first : last + 2, 2])
         goes = stops[0] or _speeds(again)[0] > _GOES[0]
     else:
-        missed = usual * (times[last + 1] - times[first])
-        at_once, trembles = (stops & (_speeds(again) > _AS_BEFORE * _speeds(usual))).any(), _trembles(steps[:, 2])
+        missed = usual * seconds
+        at_once, trembles = (stops & (_speeds(again) > _AS_BEFORE * _speeds(usual))).any(), _trembles(rates[:, 2])
         goes = at_once or trembles if times[last] - times[first] < _MAY_STAND else at_once and trembles
-    return Stall(first, last + 1, missed, usual * step, kind) if goes else None
+    return Stall(first, last + 1, missed, usual * step, kind, seconds) if goes else None
+
+
+def _rates_before(track: Track, first: int) -> np.ndarray:
+    """Return how fast (k, 3) the vehicle went in base_link, step by step, in the second before pose `first`."""
+    start = int(np.searchsorted(track.times, track.times[first] - _BEFORE))
+    times, poses = track.times[start : first + 1], track.poses[start : first + 1]
+    return seen_from(poses[:-1], poses[1:]) / np.diff(times)[:, np.newaxis]
+
+
+def _stops_at_once(rates: np.ndarray) -> np.ndarray:
+    """Return whether a vehicle that went by `rates` (k, 3) went and turned (2,) in the last step as in those before."""
+    usual = _speeds(np.median(rates, axis=0))
+    return (usual > _GOES) & (_speeds(rates[-1]) > _AS_BEFORE * usual)
 
 
 def _steered(before: np.ndarray, after: np.ndarray, times: np.ndarray, headings: np.ndarray) -> np.ndarray:
@@ -280,7 +328,7 @@ def seconds_untold(
     moves = poses - all_poses[np.maximum(before, 0)]
     is_held = (before >= 0) & (moves[:, :2] == 0.0).all(axis=1) & (moves[:, 2] != 0.0)
     steps = np.diff(all_times, prepend=all_times[0])[count:]
-    return np.where(is_held, steps, np.minimum(lost, steps))
+    return np.where(is_held, steps, lost)
 
 
 def _trembles(turns: np.ndarray) -> bool:

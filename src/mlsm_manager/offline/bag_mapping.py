@@ -365,12 +365,10 @@ def with_steady_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
 
 def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:
     """Return a recording whose odometry goes where a vehicle can have gone, and what was wrong with it."""
-    track, steps, held, stuck = mended(recording.track, limits)
+    track, steps, stuck, untold = mended(recording.track, limits)
     causes = [*of_steps(steps), *(of_stuck(*one) for one in stuck)]
-    causes += [
-        Cause(f"odometry held for {end - begin:.0f} s, and then right again,", CERTAIN, begin, True)
-        for begin, end in held
-    ]
     if not causes:
         return recording, []
+    for begin, end in untold:
+        recording = recording.without_beams(begin, end)
     return recording.with_track(track), causes

@@ -82,6 +82,11 @@ class Recording:
             self, beams=[replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in pairs]
         )
 
+    def without_beams(self, begin: float, end: float) -> "Recording":
+        """Return the recording without the beams between two times [s]; they count as unplaced."""
+        beams = [placed for placed in self.beams if not begin < placed.beam.stamp_ns * 1e-9 < end]
+        return replace(self, beams=beams, unplaced=self.unplaced + len(self.beams) - len(beams))
+
     def without_positions(self) -> "Recording":
         """Return the recording as a compass alone makes it."""
         poses = self.track.poses

@@ -92,13 +92,17 @@ def _of_kind(steps: List[Step]) -> List[Cause]:
 
 
 def _of_step(steps: List[Step]) -> Cause:
-    """Return the cause for one step, or for many of a kind. An odometry that keeps stalling is not mended."""
+    """Return the cause for one step, or for many of a kind.
+
+    An odometry that keeps stalling is not mended, nor one that hangs while the vehicle may do anything.
+    """
     most, lost = max(steps, key=lambda step: (step.size, abs(step.turn))), [step.lost for step in steps]
     text = most.text if len(steps) == 1 else f"{most.text} at most, {len(steps)} times, first"
-    seconds, is_mended = float(np.linalg.norm(lost)), len(steps) == 1 or not any(lost)
-    turn = 0.0 if most.kind is StepKind.POSITIONS else _TURN_RATE * seconds
+    is_mended = not any(lost) or (len(steps) == 1 and not most.is_too_long)
+    seconds = float(np.linalg.norm(lost))
+    turn = 0.0 if most.kind in (StepKind.POSITIONS, StepKind.HUNG) else _TURN_RATE * seconds
     metres = float(np.hypot(_LEFT * np.sqrt(len(steps)), _SPEED_CHANGE * seconds))
-    return Cause(text, CERTAIN + most.size, steps[0].time, is_mended, turn, metres=metres)
+    return Cause(text, CERTAIN + most.size, steps[0].begin, is_mended, turn, metres=metres)
 
 
 def widened(

@@ -7,14 +7,16 @@ from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring, trembling
 
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.odometry.steps import MotionLimits, impossible_steps
+from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, StepKind, impossible_steps
 from mlsm_manager.offline.bag_mapping import with_odometry_mended
 from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import wrapped
 
 pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested with every version")
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START = WHOLE.track.times[0]
+TURNING = broken.with_compass_error(WHOLE, 0.08 * (WHOLE.track.times - START), positions_follow=False)
 
 
 @pytest.mark.parametrize(
@@ -43,9 +45,37 @@ def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
 def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
     mended, causes = with_odometry_mended(broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on), LIMITS)
     assert causes[0].text.startswith("odometry stalled, and missed 1.")
-    assert causes[0].begin == pytest.approx(START + MIDDLE + 5.0, abs=0.3)
+    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
     apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
     assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+
+
+@pytest.mark.parametrize(("seconds", "is_mended"), [(20.0, True), (60.0, False)])
+def test_an_odometry_that_hung_has_the_right_heading_and_has_lost_its_place(seconds, is_mended):
+    mended, causes = with_odometry_mended(broken.odometry_hangs(TURNING, MIDDLE, seconds), LIMITS)
+    text = f"odometry hung for {seconds:.0f} s, and missed how far the vehicle went,"
+    assert [(cause.text, cause.is_mended) for cause in causes] == [(text, is_mended)]
+    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
+    apart = mended.track.at(TURNING.track.times) - TURNING.track.poses
+    assert np.abs(wrapped(apart[-100:, 2])).max() < 0.01
+    before, after = OdometryLog.of(mended.track).motion(START + MIDDLE + np.array([-1.0, seconds + 1.0])).held
+    assert after - before == pytest.approx(seconds, abs=0.3)
+
+
+def test_beams_are_left_out_where_a_vehicle_that_always_turns_lost_its_heading():
+    mended, _ = with_odometry_mended(broken.odometry_hangs(TURNING, MIDDLE, 60.0), LIMITS)
+    times = np.array([placed.beam.stamp_ns for placed in mended.beams]) * 1e-9 - START
+    assert mended.unplaced == len(TURNING.beams) - len(mended.beams) > 0
+    assert not np.any((times > MIDDLE + 0.2) & (times < MIDDLE + 59.8))
+
+
+def test_what_poses_before_the_end_of_a_stall_were_taken_for_is_not_lost():
+    hung = broken.odometry_hangs(WHOLE, MIDDLE, 5.0).track
+    odometry = ContinuousOdometry(LIMITS)
+    for last in range(20, len(hung.times), 20):
+        odometry.take(hung.chosen(slice(max(last - 40, 0), last)))
+    assert [step.kind for step in odometry.steps] == [StepKind.POSITIONS]
+    assert odometry.steps[0].lost <= hung.times[20] - hung.times[0]
 
 
 @pytest.mark.parametrize("measured", [True, False])
@@ -60,7 +90,7 @@ def test_a_vehicle_goes_on_by_its_compass_while_positions_stand(seconds):
     standing = rare.velocities_missing(WHOLE, seconds, every=MIDDLE)
     mended, causes = with_odometry_mended(standing, LIMITS)
     assert causes[0].text.startswith("positions stood while the heading went on, and missed ")
-    assert causes[0].begin == pytest.approx(START + MIDDLE + seconds, abs=0.3)
+    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
     stood = START + MIDDLE + np.array([-0.1, seconds + 0.1])
     went, mended_way = (np.diff(track.at(stood)[:, :2], axis=0)[0] for track in (WHOLE.track, mended.track))
     assert np.hypot(*(mended_way - went)) < 0.3 * np.hypot(*went)
