@@ -97,7 +97,7 @@ def mended(track: Track, limits: MotionLimits) -> Mended:
 
 
 def _untold(track: Track, steps: Sequence[Step]) -> Iterator[Tuple[float, float]]:
-    """Yield the long steps that a vehicle which turns as usual may have begun and ended with any heading between."""
+    """Yield beginnings and ends [s] of long steps within which a vehicle that turns as usual may have any heading."""
     for step in steps:
         if step.is_too_long and _bridged_apart(track, step.time - step.begin) > _ANY_HEADING:
             yield step.begin, step.time
@@ -207,10 +207,8 @@ def with_trembling_smoothed(track: Track) -> Tuple[Track, List[Step]]:
         poses[own, axis] = smoothed[own]
     steps, moves, turns = [], trembles[:, :2].any(axis=1), trembles[:, 2]
     if moves.any():
-        size, time = (
-            float(np.median(np.hypot(*noise[moves, :2].T)) / np.sqrt(2.0)),
-            float(track.times[np.argmax(moves)]),
-        )
+        size = float(np.median(np.hypot(*noise[moves, :2].T)) / np.sqrt(2.0))
+        time = float(track.times[np.argmax(moves)])
         steps.append(Step(StepKind.SCATTERS, time, time, size, 0.0))
     if turns.any():
         turn, time = float(np.median(noise[turns, 2])), float(track.times[np.argmax(turns)])

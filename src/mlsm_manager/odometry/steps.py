@@ -148,7 +148,7 @@ class ContinuousOdometry:
     def _bridge(self, track: Track, stall: "Stall", taken_until: float) -> None:
         """Let the odometry go on while it stalled; where it jumped afterwards, by as much as it jumped.
 
-        Poses until `taken_until` [s] were taken for true; what goes on as before is only lost since.
+        Poses until `taken_until` [s] were taken for true: only after that is lost what goes on as before.
         """
         before, after = track.poses[stall.begin], track.poses[stall.end]
         step, missed, lost = seen_from(before, after), stall.missed.copy(), stall.lost

@@ -19,10 +19,14 @@ LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes
 
 
 class CourseFound(NamedTuple):
-    """turn: rad, counter-clockwise, of the sonar against the vehicle. deviation: rad."""
+    """turn: rad, counter-clockwise, of the sonar against the vehicle. deviation: rad.
+
+    strafes: whether the vehicle was seen to have no usual course.
+    """
 
     turn: float
     deviation: float
+    strafes: bool = False
 
     @property
     def is_told(self) -> bool:
@@ -67,7 +71,7 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
     if spread > _STRAFES or abs(middle) > largest:
-        return NOT_TOLD
+        return NOT_TOLD._replace(strafes=True)
     deviation = 1.25 * spread / np.sqrt(_worth(wrapped(angles - middle), spread))
     return CourseFound(-middle, float(np.hypot(deviation, _AHEAD)))
 

@@ -91,9 +91,11 @@ class MotionFindings:
         course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
         # Where no course tells which of them is turned, it may be the sonar alone.
         direction = NOT_TOLD if course.is_told else self._direction
-        mounts = direction.hidden if direction.is_told else 0.0
+        turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
+        if mounts and course.strafes:
+            turn = mounts = direction.hidden
         gone = places - places[0]
-        aside = rotated(gone, np.full(len(gone), mounts or course.unexplained)) - gone
+        aside = rotated(gone, np.full(len(gone), turn)) - gone
         causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
         return replace(self, causes=causes, apart=apart, mounts=mounts, is_course_told=course.is_told)

@@ -190,6 +190,14 @@ def test_a_sonar_is_turned_where_the_vehicle_never_goes_ahead(turn, named):
     assert len(course_causes(found)) == named
 
 
+@pytest.mark.parametrize(("stretches", "strafes"), [(9, False), (40, True)])
+def test_a_vehicle_strafes_only_where_it_was_seen_long_enough(stretches, strafes):
+    courses = np.linspace(0.0, 2.0 * np.pi, stretches)
+    places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
+    found = course_of(Track(10.0 * np.arange(stretches), np.column_stack([places, np.zeros(stretches)])))
+    assert (found.is_told, found.strafes) == (False, strafes)
+
+
 def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_once():
     lasting = np.repeat(np.radians([0.0, 9.0, -12.0, 4.0, 10.0, -7.0, -3.0]), 4)
     changing = lasting.reshape(7, 4).T.ravel()
