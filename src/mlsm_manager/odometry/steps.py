@@ -261,12 +261,13 @@ def _moves(track: Track) -> np.ndarray:
 def _held(track: Track, first: int, last: int, max_speed: float) -> Optional[Stall]:
     """Return the stall of a pose that stood and then jumped, if only as far as a vehicle goes meanwhile.
 
-    Where only the heading jumped nothing tells how far the vehicle went.
+    Where only the heading jumped nothing tells how far the vehicle went. Poses that stood from the beginning on may be
+    those of a vehicle at rest.
     """
     seconds, poses = float(track.times[last] - track.times[first]), track.poses
     missed = seen_from(poses[last], poses[last + 1])
     distance = float(np.hypot(*missed[:2]))
-    if not _MAY_STAND <= seconds < _LONGEST_HELD or distance > max_speed * seconds:
+    if first == 0 or not _MAY_STAND <= seconds < _LONGEST_HELD or distance > max_speed * seconds:
         return None
     is_right = distance > LEAST_STEP[0] or not np.ptp(poses[:, :2], axis=0).any()
     kind, lost = (StepKind.HELD, 0.0) if is_right else (StepKind.HUNG, seconds)
