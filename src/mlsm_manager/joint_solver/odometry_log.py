@@ -5,7 +5,7 @@ from typing import Any, List, Tuple, Union
 
 import numpy as np
 
-from mlsm_manager.odometry.steps import seconds_untold
+from mlsm_manager.odometry.stalls import seconds_untold
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import seen_from
 

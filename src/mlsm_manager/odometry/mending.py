@@ -8,13 +8,13 @@ import numpy as np
 import scipy.sparse
 import scipy.sparse.linalg
 
-from mlsm_manager.odometry.steps import LEAST_STEP, ContinuousOdometry, MotionLimits, Step, StepKind, impossible_steps
+from mlsm_manager.odometry.continuous import ContinuousOdometry
+from mlsm_manager.odometry.stalls import standing_stretches
+from mlsm_manager.odometry.steps import LEAST_STEP, MotionLimits, Step, StepKind, impossible_steps
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import rotated, wrapped
-from node_support.timing import stretches
 
 _YAW = 2  # column of poses
-_STANDS_FOR = 10.0  # s of equal poses: longer than any odometry waits between two of them
 _COURSE = 20.0  # s before and after a step in which the vehicle shows which way it goes against its heading
 _GOES = 1.0  # m in these: less does not tell a course
 _FOLLOWS = 0.5  # share of a step of the heading, halfway between a course that turns against it and one that does not
@@ -110,17 +110,6 @@ def _bridged_apart(track: Track, seconds: float) -> float:
     yaws = track.at(starts[:, np.newaxis] + shares * seconds)[..., _YAW]
     turned = wrapped(yaws[:, -1:] - yaws[:, :1])
     return float(np.median(np.abs(wrapped(yaws - yaws[:, :1] - shares * turned)).max(axis=1))) if len(starts) else 0.0
-
-
-def standing_stretches(track: Track, first_column: int = 0) -> Iterator[Tuple[int, int]]:
-    """Yield first and last number of stretches of ten seconds or more in which the pose does not change at all.
-
-    A heading that is measured trembles, so that a pose stands only where nobody measures it, or in a simulation.
-    first_column: 2 for stretches in which the heading does not change.
-    """
-    for first, last in stretches((np.diff(track.poses[:, first_column:], axis=0) == 0.0).all(axis=1)):
-        if track.times[last] - track.times[first] >= _STANDS_FOR:
-            yield first, last
 
 
 def stuck_headings(track: Track) -> List[Tuple[float, float]]:

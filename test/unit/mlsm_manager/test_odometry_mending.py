@@ -7,7 +7,8 @@ from benchmarks import rare_faults as rare
 from made_recordings import SECONDS, touring, trembling
 
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.odometry.steps import ContinuousOdometry, MotionLimits, StepKind, impossible_steps
+from mlsm_manager.odometry.continuous import ContinuousOdometry
+from mlsm_manager.odometry.steps import MotionLimits, StepKind, impossible_steps
 from mlsm_manager.offline.bag_mapping import with_odometry_mended
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import wrapped
