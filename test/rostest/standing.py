@@ -19,14 +19,14 @@ from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import PositionStatus, StampedIntensityCloud
 
-SCANS = 4
+SCANS = 8
 FILTER = "robot_localization"
 SECONDS = 16.0
 WALLS = [((-12, 12), (14, 12)), ((14, 12), (14, -10)), ((-10, -8), (-4, -10)), ((3, 6), (5, 8))]
 
 
 class Standing(unittest.TestCase):
-    """Four scans of one place; the vehicle was moved by 0.5 m after the first, which the odometry does not tell."""
+    """Eight scans of one place; the vehicle was moved by 0.5 m after the first, which the odometry does not tell."""
 
     @classmethod
     def setUpClass(cls) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.scan_matching.scan_path import POSITION
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
-from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Verdict
+from mlsm_manager.self_check.verdict import FEWEST_CHECKED, FEWEST_MATCHED, Verdict
 from node_support.health import Health, Level
 
 _TOLD = 60.0  # s: so long a fault that was left out is told: some turns of the head, which show the place
@@ -77,8 +77,9 @@ def position_state(
         return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
-    if place.fixes < FEWEST_MATCHED:
-        return PositionState.PROVISIONAL, f"position provisional: fixes so far {place.fixes}, needed {FEWEST_MATCHED}"
+    if place.fixes < FEWEST_CHECKED:
+        needed = f"fixes so far {place.fixes}, {FEWEST_CHECKED} needed to show what is wrong"
+        return PositionState.PROVISIONAL, f"position provisional, {place.deviation:.1f} m: {needed}"
     return PositionState.GOOD, f"position good, {place.deviation:.1f} m"
 
 

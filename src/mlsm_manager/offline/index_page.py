@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
-from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer
+from mlsm_manager.self_check.verdict import FEWEST_CHECKED, Answer
 from node_support.errors import counted
 
 _PAGE = """<!DOCTYPE html>
@@ -62,7 +62,7 @@ class Outcome(NamedTuple):
         answers = {Answer(check["answer"]) for check in checks.values()}
         if Answer.DOUBTFUL in answers or self.summary.get("causes"):
             return Standing.DOUBTFUL
-        if Answer.FINE not in answers or self.summary["matched"] < FEWEST_MATCHED:
+        if Answer.FINE not in answers or self.summary["matched"] < FEWEST_CHECKED:
             return Standing.UNMEASURED
         return Standing.FINE if answers == {Answer.FINE} else Standing.PARTLY
 

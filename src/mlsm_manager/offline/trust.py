@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.path_checks import per_minute
-from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer, Verdict
+from mlsm_manager.self_check.verdict import FEWEST_CHECKED, FEWEST_MATCHED, Answer, Verdict
 from node_support.errors import counted
 
 WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
@@ -55,7 +55,7 @@ class Trust:
             said = "; ".join([*wrong, *(one.text for one in doubtful)])
             known = f"at best {self._known}" if self._is_told else _NOTHING
             return f"trust: DOUBTFUL: {said}{mended}; {known}"
-        if self.matched < FEWEST_MATCHED or not fine:
+        if self.matched < FEWEST_CHECKED or not fine:
             return f"trust: NOT MEASURED: {self._not_measured}{mended}"
         if missing:
             names = ", ".join(one.name for one in missing)
@@ -71,10 +71,13 @@ class Trust:
     @property
     def _not_measured(self) -> str:
         reason = self.assumed.text or f"none of {len(self.verdicts)} checks had enough data"
-        if self.matched < FEWEST_MATCHED:
-            reason = f"{counted(self.matched, 'scan')} matched, {FEWEST_MATCHED} needed"
+        if self.matched < FEWEST_CHECKED:
+            few = f"{counted(self.matched, 'scan')} matched, {FEWEST_CHECKED} needed to show what is wrong"
+            reason = f"{few}; {self.assumed.text}" if self.assumed.text else few
         if not self._is_told:
             return f"{reason}; {_NOTHING}"
+        if not self.assumed.text:
+            return f"{reason}; {self._known} if nothing is"
         deviation = float(self.deviations.max())
         otherwise = f", {_within(deviation)} if not" if deviation > self.if_so else ""
         return f"{reason}; {self._known} if so{otherwise}"

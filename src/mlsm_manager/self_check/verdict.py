@@ -7,6 +7,7 @@ from enum import Enum
 import numpy as np
 
 FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds
+FEWEST_CHECKED = 7  # scans: six show how alike scans of this water are, a seventh whether what they tell holds
 _RECORDED, _LATEST = 1e9, 2.0**31  # s since 1970 of clocks that tell the time: simulated ones begin near 0
 
 

@@ -85,10 +85,10 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
 @pytest.mark.parametrize(
     ("answers", "matched", "standing"),
     [
-        ((), 3, Standing.UNMEASURED),
-        (("fine", "fine"), 2, Standing.UNMEASURED),
-        (("fine", "fine"), 3, Standing.FINE),
-        (("fine", "not measured"), 3, Standing.PARTLY),
+        ((), 7, Standing.UNMEASURED),
+        (("fine", "fine"), 6, Standing.UNMEASURED),
+        (("fine", "fine"), 7, Standing.FINE),
+        (("fine", "not measured"), 7, Standing.PARTLY),
         (("not measured", "DOUBTFUL"), 0, Standing.DOUBTFUL),
     ],
 )

@@ -229,7 +229,7 @@ def test_the_first_fixes_are_provisional_and_what_they_leave_open_is_no_problem(
     report_place(health, place)
     assert health.report().level is Level.OK
     known = place._replace(covariance=0.1 * np.eye(3))
-    states = [position_state(known._replace(fixes=fixes), False, False, [])[0] for fixes in (2, 3)]
+    states = [position_state(known._replace(fixes=fixes), False, False, [])[0] for fixes in (6, 7)]
     assert states == [PositionState.PROVISIONAL, PositionState.GOOD]
     report_place(health, place._replace(fixes=3))
     assert health.report().level is Level.ERROR
@@ -246,7 +246,7 @@ def test_the_first_fixes_are_provisional_and_what_they_leave_open_is_no_problem(
     ],
 )
 def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lost, is_provisional, doubts, state):
-    place = PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3), 5)
+    place = PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3), 7)
     found, text = position_state(place, is_lost, is_provisional, doubts)
     assert found is state
     assert all(doubt in text for doubt in doubts) or state is PositionState.UNKNOWN
