@@ -4,6 +4,7 @@ import threading
 from argparse import Namespace
 from collections import deque
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Callable, List, Sequence
 
@@ -16,7 +17,7 @@ from rosgraph_msgs.msg import Clock
 
 from node_support import topics
 from node_support.timing import Pace
-from recordings.ros.play_bag import read_messages
+from recordings.ros.play_bag import Played, read_messages
 
 # Of a burst after a stop of this process no message may be lost.
 QUEUE_SIZE = 100000
@@ -36,17 +37,19 @@ def play(bag: Path, rate: float, steps: Sequence[Step] = ()) -> None:
     It begins when every listener is connected to every topic, and stops at each of the steps, which are in the order
     of time.
     """
-    messages, left = read_messages(Namespace(bag=bag, topics=None, ned=False)), deque(steps)
+    messages, left = _messages(bag), deque(steps)
     kinds = {topics.CLOCK: Clock, **{played.topic: type(played.message) for played in messages}}
     publishers = {topic: _publisher(topic, kind) for topic, kind in kinds.items()}
     for topic in publishers:
         wait_for_links(topic, len(nodes_of(topic)[1]))
-    start, pace = messages[0].time, Pace(rate, threading.Event().wait)
+    start, now, pace = messages[0].time, -1.0, Pace(rate, threading.Event().wait)
     for played in messages:
         while left and played.time > left[0].time:
             left.popleft().wait()
         pace.wait_for(played.time - start)
-        publishers[topics.CLOCK].publish(Clock(genpy.Time.from_sec(played.time)))
+        if played.time > now:
+            now = played.time
+            publishers[topics.CLOCK].publish(Clock(genpy.Time.from_sec(now)))
         publishers[played.topic].publish(played.message)
     for step in left:
         step.wait()
@@ -56,6 +59,11 @@ def steps_every(seconds: float, bag: Path, wait: Callable[[], object]) -> List[S
     """Return steps of a bag that wait for the same every few seconds."""
     with rosbag.Bag(str(bag)) as recorded:
         return [Step(time, wait) for time in np.arange(recorded.get_start_time(), recorded.get_end_time(), seconds)]
+
+
+@lru_cache(maxsize=1)
+def _messages(bag: Path) -> List[Played]:
+    return read_messages(Namespace(bag=bag, topics=None, ned=False))
 
 
 def _publisher(topic: str, kind: type) -> rospy.Publisher:
