@@ -54,7 +54,6 @@ class Datagrams:
             self._socket.sendto(data, destination)
 
     def close(self) -> None:
-        """Close the socket."""
         self._socket.close()
 
 
@@ -72,12 +71,10 @@ class Line:
             return self._port.read(max(self._port.in_waiting, 1)), None
 
     def write(self, data: bytes, receiver: Any) -> None:
-        """Send bytes."""
         with port_losses(self.name):
             self._port.write(data)
 
     def close(self) -> None:
-        """Close the line."""
         self._port.close()
 
 
@@ -114,7 +111,6 @@ class AutopilotLink:
         self._thread.start()
 
     def close(self) -> None:
-        """End the connection."""
         self._closing.set()
         self._thread.join()
 

@@ -55,7 +55,6 @@ def firmware_of(message: Any) -> Optional[Firmware]:
 
 
 def is_of_autopilot(message: Any, system: int) -> bool:
-    """Return whether a message is of the autopilot of a system."""
     return message.get_srcSystem() == system and message.get_srcComponent() == _AUTOPILOT
 
 

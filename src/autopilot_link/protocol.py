@@ -70,7 +70,6 @@ class StatedPose:
         return (_COVARIANCE_NED_ENU @ self.covariance @ _COVARIANCE_NED_ENU.T)[_UPPER]
 
     def stamped(self, stamp_ns: int) -> "StatedPose":
-        """Return the same at another stamp."""
         return replace(self, stamp_ns=stamp_ns)
 
 

@@ -59,7 +59,6 @@ class VelocityType:
 
 
 def _twist(message: Any) -> VelocityFields:
-    """Read a TwistStamped or TwistWithCovarianceStamped."""
     twist = getattr(message.twist, "twist", message.twist)
     return VelocityFields(stamp_ns(message.header), _frame(message.header.frame_id), _vector(twist.linear))
 

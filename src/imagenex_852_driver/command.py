@@ -61,7 +61,6 @@ class SwitchCommand:
 
     @property
     def reply_kind(self) -> ReplyKind:
-        """The kind of reply this command asks for."""
         if self.profile:
             return ReplyKind.IPX
         return ReplyKind.IGX if self.data_points == 500 else ReplyKind.IMX

@@ -70,7 +70,6 @@ class ReplyWait:
 
     @property
     def answered(self) -> bool:
-        """Whether anything was received that may be the answer."""
         return self.answer_bytes > 0
 
     @property
@@ -88,7 +87,6 @@ class ReplyWait:
         self._sort(replies)
 
     def expired(self, now: float) -> bool:
-        """Return whether the answer should have begun by now."""
         return not self.answered and now >= self._deadline
 
     def over(self, now: float, pending: bool) -> bool:
@@ -138,7 +136,6 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
     zero = DeviceStats()
 
     def __init__(self, connection: ConnectionParameters, *arguments: Any, **options: Any) -> None:
-        """As `LineDevice` takes them."""
         super().__init__(connection, *arguments, **options)
         self._timing = connection.timing()
         self._parser = ReplyParser()

@@ -41,7 +41,6 @@ class EmulatorParameters(EmulatedHeadParameters):
     head_id: int = parameter(SONAR_HEAD_ID, "number of the head", low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False)
 
     def timing(self) -> LineTiming:
-        """Return the timing of pings on this line."""
         return LineTiming(self.baud_rate, self.speed_of_sound)
 
 

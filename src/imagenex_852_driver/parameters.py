@@ -62,7 +62,6 @@ class HeadSettings(ParameterSet):
         self._check_sector()
 
     def command(self) -> SwitchCommand:
-        """Return the command that asks for one ping with these settings."""
         same = {one.name: getattr(self, one.name) for one in fields(SwitchCommand) if hasattr(self, one.name)}
         try:
             return SwitchCommand(
@@ -102,7 +101,6 @@ class LineTiming:
     speed_of_sound: float = 1500.0
 
     def transmission(self, byte_count: int) -> float:
-        """Return the time that `byte_count` bytes take on the line."""
         return transmission_time(byte_count, self.baud_rate)
 
     def ping_leaves(self) -> float:
@@ -128,7 +126,6 @@ class ConnectionParameters(LineParameters):
     )
 
     def timing(self) -> LineTiming:
-        """Return the timing of pings on this line."""
         return LineTiming(self.baud_rate, self.speed_of_sound)
 
 

@@ -44,12 +44,10 @@ class ReplyKind(Enum):
 
     @property
     def echo_count(self) -> int:
-        """Number of echo strengths in a reply of this kind."""
         return _ECHO_COUNTS[self]
 
     @property
     def length(self) -> int:
-        """Number of bytes of the whole reply."""
         return HEADER_LENGTH + self.echo_count + 1
 
 
@@ -99,7 +97,6 @@ class Reply:
         return self.max_range / len(self.echoes) if self.echoes else 0.0
 
     def encode(self) -> bytes:
-        """Return the bytes of the reply as the head sends them."""
         position_high = (self.head_position >> 8) << 1 | (self.head_position >> 7) & 1
         direction = _CLOCKWISE_BIT if self.clockwise else 0
         header = bytes(

@@ -43,7 +43,6 @@ def _tell(lines: List[str]) -> None:
 
 
 def info_lines(path: Path, stored: StoredMap) -> List[str]:
-    """Return in words what a map holds."""
     made = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(stored.made)) if stored.made else "at a time not known"
     lines = [f"{path}: frame {stored.frame}, made {made}"]
     lines += [f"  {layer.value}: {_layer_line(blocks)}" for layer, blocks in stored.layers.items()]

@@ -40,7 +40,6 @@ class _Input:
         self._is_expected = is_expected
 
     def take(self, now: float) -> None:
-        """Learn that a message came."""
         self._usual.take(now)
         self._newest, self._is_expected = now, False
 
@@ -118,7 +117,6 @@ class Health:
         return {topic: seconds for topic, seconds in silences.items() if seconds}
 
     def show(self, what: str, value: str) -> None:
-        """Report a value as it is."""
         with self._lock:
             self._values[what] = value
 
@@ -158,7 +156,6 @@ class Health:
 
     @contextmanager
     def timed(self) -> Iterator[None]:
-        """Measure the processing time of one message."""
         start = time.perf_counter()
         try:
             yield

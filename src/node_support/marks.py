@@ -49,5 +49,4 @@ class Marks:
             raise RefusedInput(_KIND, f"{name[:LONGEST_NAME]!r} is no mark's name")
 
     def all(self) -> List[Mark]:
-        """Return the marks in the order in which they were set."""
         return list(self._marks.values())

@@ -142,7 +142,6 @@ class ParameterSet:
 
     @classmethod
     def expert_names(cls) -> List[str]:
-        """Return the names of the parameters for experts."""
         return [field.name for field in dataclasses.fields(cls) if describe(field).expert]
 
     @classmethod

@@ -30,5 +30,4 @@ class StandingClock:
         return stamp_ns == stamp and said != before and changes == _FEWEST
 
     def stands_at(self, stamp_ns: int) -> bool:
-        """Return whether any clock stands at or before a stamp."""
         return any(changes >= _FEWEST and stamp <= stamp_ns for stamp, _, changes in list(self._newest.values()))

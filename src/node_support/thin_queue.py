@@ -42,7 +42,6 @@ class ThinQueue:
 
     @property
     def waiting_bytes(self) -> int:
-        """Of all that waits."""
         return sum(one.size for one in self._waiting.values())
 
     def put(self, key: Hashable, item: Any, size: int, priority: int) -> None:
@@ -53,7 +52,6 @@ class ThinQueue:
         self._waiting[key] = Waiting(item, size, priority, turn)
 
     def drop(self, keys: List[Hashable]) -> None:
-        """Forget what waits under these keys."""
         for key in keys:
             self._waiting.pop(key, None)
 

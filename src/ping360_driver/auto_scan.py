@@ -52,7 +52,6 @@ class AutoScan:
             self._revive(outcome, command)
 
     def end(self) -> None:
-        """Make the head stop, if it scans."""
         if self._running is None:
             return
         if self._can_interrupt:

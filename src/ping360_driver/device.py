@@ -75,7 +75,6 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
     zero = Ping360Stats()
 
     def __init__(self, connection: LineParameters, *arguments: Any, **options: Any) -> None:
-        """As `LineDevice` takes them."""
         super().__init__(connection, *arguments, **options)
         self._is_serial = not is_datagram_port(connection.port)
         self._baud_rate = connection.baud_rate if self._is_serial else float("inf")

@@ -214,7 +214,6 @@ class EmulatedPing360(EmulatedHead):
 
 
 def _pulse(command: PingMessage) -> PulseSettings:
-    """Return the pulse of a command, as the firmware makes it."""
     asked = {name: getattr(command, name) for name in PulseSettings.__dataclass_fields__}
     longest = longest_pulse_us(command.sample_period)
     return PulseSettings(**{**asked, "transmit_duration": min(asked["transmit_duration"], longest)})

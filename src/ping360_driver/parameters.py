@@ -71,7 +71,6 @@ class HeadSettings(ParameterSet):
             )
 
     def command(self) -> ScanCommand:
-        """Return the command that makes the head scan with these settings."""
         samples, period = self._sampling()
         pulse = PulseSettings(
             gain_setting=self.gain_setting,

@@ -36,7 +36,6 @@ class Outcome:
 
     @property
     def is_over(self) -> bool:
-        """Whether the ping has come to any end."""
         return self.beam is not None or bool(self._without_beam())
 
     def interrupt(self) -> None:
@@ -46,7 +45,6 @@ class Outcome:
             self.interrupted, self.error = 1, ""
 
     def counts(self) -> Dict[str, int]:
-        """Return what is added to the counts of the device."""
         replies = int(self.beam is not None)
         return {"pings": replies + self._without_beam(), "replies": replies, **{n: getattr(self, n) for n in _COUNTS}}
 

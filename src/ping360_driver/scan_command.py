@@ -64,7 +64,6 @@ class ScanCommand:
 
     @property
     def is_full_turn(self) -> bool:
-        """Whether the head turns without end."""
         return self.width >= TURN
 
     @property
@@ -95,7 +94,6 @@ class ScanCommand:
 
 
 def information_request() -> bytes:
-    """Return the message that asks the head who it is."""
     return packed(MessageId.GENERAL_REQUEST, requested_id=MessageId.DEVICE_INFORMATION)
 
 
@@ -200,7 +198,6 @@ class DeviceInformation:
 
     @property
     def is_ping360(self) -> bool:
-        """Whether it is a Ping360."""
         return self.device_type == _PING360
 
     @property
@@ -230,7 +227,6 @@ def listening_time(message: PingMessage) -> float:
 
 
 def device_information(message: PingMessage) -> DeviceInformation:
-    """Return what a DEVICE_INFORMATION message says."""
     return DeviceInformation(
         message.device_type,
         (message.firmware_version_major, message.firmware_version_minor, message.firmware_version_patch),
@@ -238,6 +234,5 @@ def device_information(message: PingMessage) -> DeviceInformation:
 
 
 def refusal(message: PingMessage) -> str:
-    """Return in words what a NACK message says."""
     reason = bytes(getattr(message, "nack_message", b"")).decode("ascii", "replace").strip("\0")
     return f"the head refused message {message.nacked_id}: {reason or 'no reason given'}"

@@ -180,7 +180,6 @@ _ANGLES = {"angle": 1.0, "angle_deg": np.pi / 180.0}  # rad
 
 
 def _is_beam_table(path: Path) -> bool:
-    """Return whether a file is a table with a column of bins."""
     if not is_table(path):
         return False
     try:

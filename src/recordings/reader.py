@@ -64,7 +64,6 @@ class Content:
 
     @property
     def notes(self) -> List[str]:
-        """Sentences."""
         return [*self.motion.notes, *self.recorded.notes]
 
 
@@ -236,6 +235,5 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def request_of(options: argparse.Namespace, parameters: ReadingParameters) -> Request:
-    """Return what the arguments ask for."""
     motion = MotionNames(options.odom_frame, options.base_frame, options.odometry_topic, options.declared, options.ned)
     return Request(options.beams, options.truth, motion, options.vehicle, options.offset, parameters)

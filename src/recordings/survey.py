@@ -85,7 +85,6 @@ def _survey_of_bag(path: Path, bag: Bag, request: Request) -> Survey:
 
 
 def _assumed(motion: Optional[Motion], recorded: RecordedBeams, request: Request, missing: List[str]) -> List[str]:
-    """Return what is assumed of motion and beams, and add to what is missing."""
     assumed = [*(motion.notes if motion is not None else []), *recorded.notes]
     if motion is not None and recorded.beams:
         _look_at_place(motion, recorded, request, assumed, missing)
@@ -214,7 +213,6 @@ def _head(beams: List[Beam]) -> List[str]:
 
 
 def _settings(beams: List[Beam], recorded: RecordedBeams) -> List[str]:
-    """Return in words which ranges, steps and gains there were from when on."""
     stamps = [beam.stamp_ns for beam in beams]
     ranges = [f"{round(len(beam.ranges) * beam.range_resolution, 1):g} m in {len(beam.ranges)} bins" for beam in beams]
     steps = np.degrees(np.abs(wrapped(np.diff([beam.angle for beam in beams]))))
@@ -229,7 +227,6 @@ def _settings(beams: List[Beam], recorded: RecordedBeams) -> List[str]:
 
 
 def _since(name: str, told: Sequence[str], stamps_ns: Sequence[int]) -> str:
-    """Return what a setting was, as `told` at each stamp, and from when on."""
     alike = groupby(zip(told, stamps_ns), key=lambda one: one[0])
     found = [f"{one} from {(next(run)[1] - stamps_ns[0]) * 1e-9:.1f} s" for one, run in alike]
     more = f", and {len(found) - _MOST_SETTINGS} changes more" if len(found) > _MOST_SETTINGS else ""

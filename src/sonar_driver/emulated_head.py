@@ -55,7 +55,6 @@ class FaultRates(ParameterSet):
 
     @classmethod
     def known(cls) -> Tuple[Fault, ...]:
-        """Return the faults that these heads can have."""
         names = {field.name for field in fields(cls)}
         return tuple(fault for fault in Fault if fault.value in names)
 
@@ -74,7 +73,6 @@ class FaultInjector:
         self._ordered.extend([fault] * count)
 
     def next(self) -> Fault:
-        """Return the fault of the next command."""
         fault = self._ordered.popleft() if self._ordered else self._drawn()
         self.counts[fault] += 1
         return fault

@@ -115,11 +115,9 @@ class UdpPort:
         """Do nothing: there is no line to break."""
 
     def close(self) -> None:
-        """Close the connection."""
         self._socket.close()
 
     def _receive(self, timeout: float) -> bool:
-        """Wait for one datagram; return whether one came."""
         self._socket.settimeout(max(timeout, 0.0))
         try:
             self._buffer += self._socket.recv(_LONGEST_DATAGRAM)

@@ -29,7 +29,6 @@ class Board:
 
     @property
     def pages(self) -> int:
-        """How many look."""
         return len(self._pages)
 
     def put(self, key: Hashable, item: Item, priority: int) -> None:
@@ -69,7 +68,6 @@ class Board:
                 page.put(key, item, len(item), priority)
 
     def close(self, page: ThinQueue) -> None:
-        """Forget a page."""
         with self.lock:
             self._pages.discard(page)
 

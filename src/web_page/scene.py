@@ -110,7 +110,6 @@ class Scene:
         self._fixes.take(row)
 
     def take_map(self, now: float, points: np.ndarray, counts: np.ndarray, cell: float) -> None:
-        """Take the blocks of the map, see `MapTiles.take`."""
         seconds = self._since_start(now)
         if cell != self._cell:
             self._cell = cell
@@ -119,22 +118,18 @@ class Scene:
         self._tiles.take(points, counts, cell, seconds)
 
     def take_beam(self, beam: Beam, T_base_sonar: np.ndarray, T_map_sonar: np.ndarray) -> None:
-        """Take a beam, see `SonarDisc.take`."""
         self._heard["beams"] = self._clock()
         self._disc.take(beam, T_base_sonar, T_map_sonar)
 
     def take_status(self, status: Status) -> None:
-        """Take how well the position is known."""
         self._heard["status"] = self._clock()
         self._status = status
 
     def take_marks(self, marks: Sequence[Mark]) -> None:
-        """Take the marks of the map."""
         self._marks = marks
         self.board.put("marks", text_of(marks=[[mark.name, mark.x, mark.y] for mark in marks]), WORDS)
 
     def tell_now(self, now: float) -> None:
-        """Send those who look what holds now."""
         seconds = self._since_start(now) if now else 0.0
         clock = self._clock()
         words = {"t": round(seconds, 2), "ages": {name: round(clock - at, 1) for name, at in self._heard.items()}}
@@ -172,7 +167,6 @@ class History:
         self.clear()
 
     def clear(self) -> None:
-        """Forget all."""
         self._rows: List[Sequence[float]] = []
         self._least = self._first_least
 

@@ -87,11 +87,9 @@ class _Chart(RequestHandler):
     """The marks as a file to download."""
 
     def initialize(self, served: Served, parameters: WebPageParameters) -> None:
-        """Remember what is served."""
         self._served = served
 
     def get(self) -> None:
-        """Answer with GeoJSON."""
         for name, value in {**_HEADERS, "Content-Type": "application/geo+json"}.items():
             self.set_header(name, value)
         self.set_header("Content-Disposition", 'attachment; filename="marks.geojson"')
@@ -102,7 +100,6 @@ class _Live(WebSocketHandler):
     """One page that is open: gets what is new as fast as it takes it, and may set marks."""
 
     def initialize(self, served: Served, parameters: WebPageParameters, opened: Set["_Live"]) -> None:
-        """Remember what is served; opened: all pages that are open."""
         self._served, self._parameters, self._opened = served, parameters, opened
         self._queue = ThinQueue(parameters.bytes_per_second)
         self._is_fed, self._next_request = False, 0.0
@@ -112,7 +109,6 @@ class _Live(WebSocketHandler):
         return {"compression_level": 3, "mem_level": 5}
 
     def open(self, *_: Any) -> None:
-        """Refuse a page where enough are open."""
         self.set_nodelay(True)
         self._opened.add(self)
         if len(self._opened) > self._parameters.most_pages:
@@ -169,6 +165,5 @@ class _Live(WebSocketHandler):
             self._served.board.close(self._queue)
 
     def on_close(self) -> None:
-        """Forget the page."""
         self._opened.discard(self)
         self._served.board.close(self._queue)

@@ -54,7 +54,6 @@ def counts(values: Mapping[str, str]) -> List[Tuple[str, str, str]]:
 
 
 def checks(values: Mapping[str, str]) -> List[Tuple[str, str, str]]:
-    """Return name, answer and reason of each check."""
     found = []
     for name, value in values.items():
         answer = next((answer for answer in _ANSWERS if value.startswith(answer)), None)

@@ -31,7 +31,6 @@ class MapTiles:
 
     @property
     def cells(self) -> int:
-        """How many hold something."""
         return len(self._keys)
 
     def take(self, points: np.ndarray, counts: np.ndarray, cell: float, time: float) -> None:

@@ -51,7 +51,6 @@ class MavrosTopics:
         return "" if self._publisher.get_num_connections() else f"nobody listens to {self._publisher.resolved_name}"
 
     def send(self, pose: StatedPose) -> None:
-        """Publish a position."""
         message = self._publisher.data_class()
         message.header.stamp = rospy.Time(*divmod(pose.stamp_ns, 10**9))
         message.header.frame_id = self._frames[0]

@@ -14,13 +14,11 @@ from underwater_map_construction.msg import SonarScanLine
 
 
 def run_driver() -> None:
-    """Run the driver."""
     model = SonarModel("imagenex_852_driver", DriverParameters, SonarDevice, _ping_message)
     run(model.name, lambda: DriverNode(model))
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
-    """Run the emulated head; `world_echoes` builds the echoes of the simulator."""
     model = HeadModel("imagenex_852_emulator", EmulatorParameters, _head, _line)
     run(model.name, lambda: EmulatorNode(model, world_echoes))
 

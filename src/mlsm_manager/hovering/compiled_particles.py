@@ -34,7 +34,6 @@ class Echoes(NamedTuple):
 
     @property
     def size(self) -> int:
-        """Number of points."""
         return len(self.nodes)
 
     @classmethod

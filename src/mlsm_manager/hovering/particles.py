@@ -29,7 +29,6 @@ _POST_POWER = 0.5  # of their qualities: weak ones are heard again nearly as oft
 
 
 def echoes_of(log: RunLog, parameters: SolverParameters, scan: int) -> Echoes:
-    """Return those of a scan of the log."""
     motion = log.node_motion(np.array([scan, scan + 1]))
     nodes = np.zeros((log.scan_count + 1, parameters.odometry.width))
     nodes[scan : scan + 2, :2] = -motion.poses[:, :2]
@@ -41,7 +40,6 @@ def echoes_of(log: RunLog, parameters: SolverParameters, scan: int) -> Echoes:
 
 
 def echoes_of_run(log: RunLog, parameters: SolverParameters) -> Echoes:
-    """Return those of all scans of the log, at least one."""
     return Echoes.joined([echoes_of(log, parameters, scan) for scan in range(log.scan_count)])
 
 
@@ -111,7 +109,6 @@ class Particles(NamedTuple):
         return (offset * weights[:, np.newaxis]).T @ offset
 
     def selected(self, rows: np.ndarray) -> "Particles":
-        """Return the particles in `rows` (m,)."""
         return Particles(self.paths[rows], self.speeds[rows], self.log_weights[rows])
 
     def continued(self, ends: np.ndarray, speeds: np.ndarray, longest: int) -> "Particles":

@@ -79,7 +79,6 @@ class LoopClosure:
     gain: float
 
     def to_mapping(self) -> Dict[str, Any]:
-        """Return it for summary.json."""
         return {
             "gain": None if np.isnan(self.gain) else round(self.gain, 1),
             "found": [loop.line() for loop in self.loops],
@@ -217,7 +216,6 @@ class _Batch:
         return on_surfaces - 0.5 * self._expected().cost
 
     def _expected(self) -> NormalEquations:
-        """Return what is expected of the unknowns without any echo."""
         equations = NormalEquations(self._layout.size)
         odometry, parameters = self._odometry, self._parameters
         value = np.append(self.state.nodes[0], self.state.run)
@@ -231,7 +229,6 @@ class _Batch:
         return equations
 
     def met(self) -> Tuple[PlacedPoints, Pairs]:
-        """Return all points and their comparisons."""
         parameters = self._parameters
         _, (points,) = across_weak([self._run.placed(self._points)], parameters)
         if self._lists is None:

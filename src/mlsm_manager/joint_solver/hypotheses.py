@@ -71,7 +71,6 @@ class Hypotheses:
 
     @property
     def solvers(self) -> List[LiveSolver]:
-        """All of them, that which is believed first."""
         return [solver for solver in (self.shown, self.other) if solver is not None]
 
     def follow(self, track: Track, time: float) -> None:
@@ -168,7 +167,6 @@ class Hypotheses:
         return replace(fit, pose_covariances=fit.pose_covariances + added)
 
     def show_other(self) -> None:
-        """Show the solver of the other odometry."""
         self.shown, self.other = self.other, self.shown
 
     @property
@@ -180,7 +178,6 @@ class Hypotheses:
 
     @property
     def _names(self) -> Tuple[str, str]:
-        """Names of the odometry that is shown, and of the other one."""
         unsure, mixture = self._unsure, self._unsure.odometry.mixture
         names = mixture.likeliest(unsure.told).name, mixture.rival.name
         return names if self.shown is unsure else names[::-1]

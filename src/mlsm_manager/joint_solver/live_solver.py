@@ -245,7 +245,6 @@ class LiveSolver:
         self._forgotten_until = old
 
     def _start_at(self, fix: Fix) -> None:
-        """Put the newest node where its scan was found."""
         node = self.log.scan_count
         self.fixes.by_node[node] = fix
         self.state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([node]))[0, :YAW]
@@ -305,7 +304,6 @@ class LiveSolver:
             self.search = put_newest(self.solution, covariance, self._silent)
 
     def _search_by_parts(self) -> None:
-        """Put the newest nodes where the search for nodes finds them likeliest."""
         if self._by_parts is not None:
             self._by_parts = self._by_parts.followed(self.log, self.parameters)
             starts_known = self._known is not None or self._start is not None

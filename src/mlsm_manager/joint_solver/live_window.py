@@ -283,7 +283,6 @@ class LiveWindow:
 
     @property
     def oldest(self) -> int:
-        """The oldest free node."""
         return self._layout.first
 
     def covariances_of_oldest(self, count: int) -> np.ndarray:

@@ -38,7 +38,6 @@ class Loop:
     place: PlaceCandidate
 
     def line(self) -> str:
-        """Return it as one line for people."""
         return (
             f"scan {self.scan + 1} lies on what scan {self.older + 1} heard, {np.hypot(*self.place.shift):.1f} m "
             f"beside its place: {100 * self.place.fit:.0f} % of its echoes fit there, "
@@ -226,5 +225,4 @@ class ClosedLoop:
     gain: float
 
     def line(self) -> str:
-        """Return it as one line for people."""
         return f"found a place heard {self.seconds:.0f} s ago again: moved by {np.hypot(*self.shift):.1f} m"

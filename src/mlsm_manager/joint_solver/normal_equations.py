@@ -31,7 +31,6 @@ class State:
     run: np.ndarray
 
     def copy(self) -> "State":
-        """Return a copy that can be changed alone."""
         return State(self.nodes.copy(), self.run.copy())
 
 
@@ -56,7 +55,6 @@ class Layout:
         object.__setattr__(self, "size", self.run_start + RUN_COLUMNS)
 
     def node_start(self, node: np.ndarray) -> np.ndarray:
-        """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
 
     @property
@@ -124,7 +122,6 @@ class NormalEquations:
         self._terms = []
 
     def add(self, *sets: Residuals) -> None:
-        """Add sets of residuals, one after the other."""
         for columns, jacobian, values, weights in sets:
             weighted = weights[:, np.newaxis] * jacobian
             self.add_terms(

@@ -28,7 +28,6 @@ class GrowingArray:
         return len(self.values)
 
     def shorten(self, count: int) -> None:
-        """Keep the first `count` rows."""
         self.values = self.values[:count]
 
     def keep(self, chosen: np.ndarray) -> None:
@@ -72,7 +71,6 @@ class GrowingTable:
             array.extend(rows[name])
 
     def shorten(self, count: int) -> None:
-        """Keep the first `count` rows."""
         for array in self._columns.values():
             array.shorten(count)
 
@@ -110,7 +108,6 @@ class OdometryLog:
 
     @classmethod
     def of(cls, track: Track) -> "OdometryLog":
-        """Return the log of a whole track."""
         log = cls()
         log.extend(track, np.inf)
         return log
@@ -119,7 +116,6 @@ class OdometryLog:
         return len(self._table)
 
     def shorten(self, count: int) -> None:
-        """Keep the oldest `count` poses."""
         self._table.shorten(count)
 
     def thin(self, until: float) -> None:

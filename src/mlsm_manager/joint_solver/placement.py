@@ -150,7 +150,6 @@ class PlacedPoints:
         return PlacedPoints(*(getattr(self, field.name)[rows] for field in fields(self)))
 
     def joined_with(self, others: "PlacedPoints") -> "PlacedPoints":
-        """Return these points and then the others."""
         names = [field.name for field in fields(self)]
         return PlacedPoints(*(np.concatenate([getattr(self, name), getattr(others, name)]) for name in names))
 

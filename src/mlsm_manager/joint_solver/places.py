@@ -60,7 +60,6 @@ class PlaceCandidate:
         return self.fit >= max(_FIT, self.elsewhere + _LEAD)
 
     def line(self) -> str:
-        """Return it as one line for people."""
         return (
             f"{100 * self.fit:.0f} % of the echoes fit {np.hypot(*self.shift):.1f} m beside the expected place, "
             f"{100 * self.elsewhere:.0f} % at another place within {REACH * self.reach:.0f} m"

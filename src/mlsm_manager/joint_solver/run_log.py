@@ -29,7 +29,6 @@ class PointTable:
 
     @property
     def scan_count(self) -> int:
-        """Number of scans so far."""
         return len(self._starts.values) - 1
 
     @property
@@ -38,7 +37,6 @@ class PointTable:
         return np.diff(self._starts.values)
 
     def append(self, points: SurfacePoints) -> None:
-        """Append the points of one scan."""
         count = len(points.times)
         self._table.extend(**vars(points), scans=np.full(count, self.scan_count))
         self._starts.extend([self._starts.values[-1] + count])
@@ -53,7 +51,6 @@ class PointTable:
         return later
 
     def shorten(self, scans: int) -> None:
-        """Keep the oldest `scans`."""
         self._starts.shorten(scans + 1)
         self._table.shorten(self._starts.values[-1])
 
@@ -139,7 +136,6 @@ class RunLog:
         self._count()
 
     def _count(self) -> None:
-        """Learn how many scans there are now."""
         self.scan_count = self.surfaces.scan_count
         self.node_times, self.forgotten = self._node_times.values, self._scans.values["forgotten"]
 

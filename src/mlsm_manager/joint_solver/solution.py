@@ -59,11 +59,9 @@ class Submaps:
         return self._numbers.index(self.newest) if self.is_apart else 0
 
     def append(self) -> None:
-        """Add a scan to the newest submap."""
         self._numbers.append(self.newest)
 
     def shorten(self, count: int) -> None:
-        """Keep the oldest `count` scans."""
         del self._numbers[count:]
 
     def begin(self) -> None:
@@ -170,7 +168,6 @@ class Solution:
     fixes: Fixes = field(default_factory=Fixes)
 
     def with_state(self, state: State) -> "Solution":
-        """Return the run with other unknowns."""
         return replace(self, state=state)
 
     def since(self, scan: int) -> "Solution":

@@ -56,7 +56,6 @@ class SonarFault:
 
     @property
     def text(self) -> str:
-        """What is wrong and by how much."""
         if self.kind is SonarKind.ARM:
             ahead, aside = self.sizes
             return f"the sonar sits {ahead:+.1f} m ahead and {aside:+.1f} m to the left of where tf says"
@@ -78,7 +77,6 @@ class SonarFault:
 
     @property
     def is_possible(self) -> bool:
-        """Whether a sonar can have it."""
         return self.kind is not SonarKind.RANGES or abs(self.sizes[0]) < _LARGEST
 
     def _stretch(self) -> np.ndarray:

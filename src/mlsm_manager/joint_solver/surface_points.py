@@ -46,7 +46,6 @@ class Sights(NamedTuple):
 
     @property
     def echo_count(self) -> float:
-        """How many echoes the points belong to."""
         return float((1.0 / self.per_echo).sum())
 
 
@@ -73,12 +72,10 @@ class SurfacePoints:
 
     @classmethod
     def joined(cls, parts: Sequence["SurfacePoints"]) -> "SurfacePoints":
-        """Return the points of all `parts`, at least one."""
         return cls(*(np.concatenate([getattr(part, field.name) for part in parts]) for field in fields(cls)))
 
     @classmethod
     def of(cls, scan: Scan, sights: Sights) -> "SurfacePoints":
-        """Return the points of a scan that lie on surfaces."""
         sight, ranges, bearings, reach, per_echo = sights
         normals, qualities = surface_normals(scan.points[:, :2], reach)
         normals = rotated(normals, -scan.track.at(scan.times)[:, 2])

@@ -113,7 +113,6 @@ class Estimator(ABC):
 
     @property
     def shown(self) -> MultiLevelSurfaceMap:
-        """The map that is shown and saved."""
         return self._maps.shown.map
 
     @property
@@ -132,7 +131,6 @@ class Estimator(ABC):
         return self.matched
 
     def map_of(self, layer: Layer) -> Union[MultiLevelSurfaceMap, KeyframeCarving]:
-        """Return one of the maps that are stored."""
         return {Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free}[layer]
 
     @property

@@ -75,7 +75,6 @@ class Joint(Estimator):
         super().__init__(settings, errors, matcher, sonar_in_base)
 
     def clear(self) -> None:
-        """Forget the map and the place in it."""
         self._session = None
         super().clear()
 

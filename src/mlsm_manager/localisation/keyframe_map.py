@@ -106,7 +106,6 @@ class KeyframeMap:
         return carved
 
     def _carved(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
-        """As `carve` while only what is settled is in the map."""
         report, noted = self._free.carve(self._map, points, times, origins)
         if self._stretches is not None and noted is not None:
             self._stretches.note_free(noted)
@@ -173,7 +172,6 @@ class KeyframeMap:
         return self._carved(points, cloud.times, origins)
 
     def _draw_what_is_due(self) -> None:
-        """Draw the keyframes that may still move, if that was put off."""
         if self._due is None:
             return
         placement, self._due = self._due, None

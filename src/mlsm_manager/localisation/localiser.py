@@ -292,7 +292,6 @@ class Localiser:
 
     @property
     def block_count(self) -> int:
-        """Number of blocks of the map that is shown."""
         with self._lock:
             return len(self.estimator.shown)
 

@@ -71,7 +71,6 @@ class PlaceSearch:
 
     @property
     def is_lost(self) -> bool:
-        """Whether the whole map must be searched."""
         return self._left == 0
 
     def learn(self, accepted: bool) -> None:

@@ -112,7 +112,6 @@ class OdometryChoice(OdometryErrors):
     )  # fmt: skip
 
     def odometry_model(self) -> OdometryModel:
-        """Return the model of the motion for the joint solver."""
         return _MODELS[self.odometry](self)
 
     def node_search(self, parts_per_turn: int) -> Optional[NodeSearch]:

@@ -104,7 +104,6 @@ class LocaliserParameters(
         return Joint(*given, self.solver_parameters(), self._without_positions() if found else None)
 
     def _without_positions(self) -> Assumed:
-        """Return what is assumed of an odometry that reports headings only."""
         other = self.changed(profile_values(OdometryKind.HEADING))
         return Assumed(other.solver_parameters(), other.part(OdometryErrors))
 
@@ -139,7 +138,6 @@ class LocaliserParameters(
         return DistributionMatcher(limits, self.beam_width, self.range_scale_deviation)
 
     def map_settings(self) -> MapSettings:
-        """Return what the grids are made from."""
         return MapSettings(
             self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.carver
         )  # fmt: skip
@@ -151,7 +149,6 @@ class LocaliserParameters(
 
     @property
     def matches_from_start(self) -> bool:
-        """Whether scans are matched from the start."""
         return True
 
     @property
@@ -263,7 +260,6 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
 
     @property
     def matches_from_start(self) -> bool:
-        """Whether scans are matched from the start."""
         return self.start_matching
 
     @property

@@ -63,7 +63,6 @@ class ScanResult:
 
 
 def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
-    """Count a scan and show what its match found."""
     health.show("matching", "on" if matching else "off")
     if matching:
         health.show("map", _PROVISIONAL if update.provisional else "scans agree with each other")

@@ -52,7 +52,6 @@ class MotionFault:
 
     @property
     def text(self) -> str:
-        """What is wrong and by how much."""
         size = float(np.linalg.norm(self.sizes))
         if self.kind is FaultKind.STUCK:
             missed = f" and missed {np.degrees(self.sizes[0]):.0f} deg" if size else ""

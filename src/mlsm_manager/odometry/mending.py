@@ -39,7 +39,6 @@ class ReportedMotion:
         self._first_yaw = np.nan
 
     def learn(self, track: Track) -> None:
-        """Learn what was reported on a track."""
         poses = track.poses.copy()
         if np.isnan(self._first_yaw):
             self._first_yaw = poses[0, 2]
@@ -59,12 +58,10 @@ class ReportedMotion:
 
     @property
     def has_positions(self) -> bool:
-        """Whether positions changed."""
         return self.extent > _UNMOVED
 
     @property
     def has_headings(self) -> bool:
-        """Whether the heading changed."""
         return self.turned > _UNTURNED
 
     @property

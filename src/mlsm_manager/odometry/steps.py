@@ -69,7 +69,6 @@ class Step:
 
     @property
     def text(self) -> str:
-        """What happened, without the time."""
         return self.kind.value.format(size=self.size, turn=np.degrees(self.turn), seconds=self.time - self.begin)
 
 

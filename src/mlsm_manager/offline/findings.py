@@ -48,7 +48,6 @@ class Calibration:
 
     @classmethod
     def expected(cls, solver: LiveSolver) -> "Calibration":
-        """Return what was known before the run."""
         odometry, parameters = solver.odometry, solver.parameters
         columns = list(odometry.calibrated.values())
         deviations = np.append(parameters.run_deviations(solver.log), odometry.first_deviations()[columns])
@@ -142,7 +141,6 @@ def _refined_path(refined: Refined, solver: LiveSolver) -> _BestPath:
 
 
 def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> List[Verdict]:
-    """Return what the checks say of a run of the joint solver."""
     solver = replayed.solver
     parts, apart = solver.parameters.parts_per_turn, solver.submaps.apart
     turns = Turns.of(solver.estimates, apart, parts)
@@ -230,7 +228,6 @@ class Findings:
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 
     def to_mapping(self) -> Dict[str, Any]:
-        """Return what summary.json holds of it."""
         loops = {} if self.closing is None else {"loops": self.closing.to_mapping()}
         return {
             "calibration": self.calibration.to_mapping(),

@@ -34,7 +34,6 @@ class Standing(Enum):
 
     @property
     def badge(self) -> str:
-        """HTML."""
         words, color = self.value
         return f'<b style="background:{color}">{words}</b>'
 

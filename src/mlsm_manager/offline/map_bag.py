@@ -80,7 +80,6 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
 
 
 def _write_results(folder: Path, mapped: MappedBag, options: Namespace) -> None:
-    """Write map, trajectories and live.yaml."""
     write_run(folder, mapped.title, mapped.run, mapped.recording)
     for number, session in enumerate(mapped.sessions, start=2):
         write_trajectory(folder / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
@@ -90,7 +89,6 @@ def _write_results(folder: Path, mapped: MappedBag, options: Namespace) -> None:
 
 
 def _write_report(folder: Path, mission: Mission) -> None:
-    """Write report.html where plotly is installed, else say what to install."""
     try:
         from mlsm_manager.report.page import write_report
     except ImportError:
@@ -171,7 +169,6 @@ def _origin(text: str) -> AskedOrigin:
 
 
 def _add_solving_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add what says how the poses of scans are found."""
     parser.add_argument(
         "--odometry", choices=[kind.value.lower() for kind in OdometryKind],
         help="what the vehicle knows of its motion; auto, the default, is as recording and echoes tell",

@@ -77,7 +77,6 @@ def _draw_uncertainty(axes: Axes, path: Trajectory, uncertainty: Uncertainty) ->
 
 
 def _draw_blocks(axes: Axes, blocks: Blocks) -> None:
-    """Draw the points faintly, and lines where they form a surface."""
     numbers, low, side = counts(blocks)
     (left, bottom), (right, top) = low * side, (low + numbers.shape[::-1]) * side
     shades = np.ma.masked_equal(np.log1p(numbers), 0.0)

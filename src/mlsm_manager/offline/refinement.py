@@ -38,12 +38,10 @@ class Refined:
 
     @property
     def batch(self) -> BatchResult:
-        """The fit."""
         return self.motion.fit
 
     @property
     def solution(self) -> Solution:
-        """The run as fitted."""
         return self.motion.run
 
 

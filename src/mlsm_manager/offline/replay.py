@@ -41,7 +41,6 @@ class ReplayParameters(LocaliserParameters, ReadingParameters, BeamCorrection, E
     """
 
     def echoes(self) -> EchoExtractorParameters:
-        """Return how echoes are found."""
         return self.part(EchoExtractorParameters)
 
     def solver_parameters(self) -> SolverParameters:
@@ -114,7 +113,6 @@ def replay_values(values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]
 def live_text(
     parameters: ReplayParameters, odom_frame: str, base_frame: str, chain: Optional[ThesisChain] = None
 ) -> str:
-    """Return the text of live.yaml."""
     values = live_values(parameters, odom_frame, base_frame, chain)
     return _COMMENT + yaml.safe_dump(values, sort_keys=False, allow_unicode=True)
 
@@ -164,7 +162,6 @@ class Replayed:
 
     @property
     def solver(self) -> Optional[LiveSolver]:
-        """The one of them that is believed."""
         return self.estimator.solver
 
     @property

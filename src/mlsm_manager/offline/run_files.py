@@ -51,7 +51,6 @@ class Run:
 
     @property
     def blocks(self) -> Blocks:
-        """The blocks of the final map."""
         return self.stored.shown
 
 

@@ -29,7 +29,6 @@ class Session:
     replayed: Replayed
 
     def to_mapping(self) -> Dict[str, object]:
-        """Return what summary.json tells."""
         return {
             "bag": self.bag.name,
             "scans": len(self.replayed.updates),
@@ -60,6 +59,5 @@ def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Rec
 
 
 def executor_for(jobs: int) -> Executor:
-    """Return processes of this machine that run jobs."""
     # No fork: the parent may have threads that hold locks.
     return ProcessPoolExecutor(max(min(jobs, cpu_count()), 1), get_context("spawn"))

@@ -98,7 +98,6 @@ class Mission:
 
     @property
     def best(self) -> Path:
-        """The path that counts."""
         return self.paths[-1]
 
     @property

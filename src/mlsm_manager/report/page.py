@@ -56,7 +56,6 @@ class _Quantity:
     less: str
 
     def told(self, value: float) -> str:
-        """Return in words what was found."""
         return f"{self.number(value)} {self.more if value >= 0.0 else self.less}"
 
     def number(self, value: float) -> str:
@@ -152,14 +151,12 @@ def _words(values: Mapping[str, object]) -> List[Tuple[str, str]]:
 
 
 def _table(head: Sequence[str], rows: Iterable[Sequence[str]], style: str = "") -> str:
-    """Return a table of cells that are HTML already."""
     titles = "".join(f"<th>{escape(title)}</th>" for title in head)
     body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in row) + "</tr>" for row in rows)
     return f'<table class="{style}"><thead><tr>{titles}</tr></thead><tbody>{body}</tbody></table>'
 
 
 def light_of(verdict: Verdict) -> Light:
-    """Return the light of a check."""
     if verdict.answer is not Answer.FINE:
         return Light.RED if verdict.fires else Light.GREY
     worse = verdict.limit / verdict.value if verdict.more_is_better else verdict.value / verdict.limit
@@ -172,7 +169,6 @@ def light_of_run(lights: List[Light]) -> Light:
 
 
 def sentence(verdict: Verdict) -> str:
-    """Return what a check found, in words."""
     text = verdict.line() if verdict.answer is Answer.NOT_MEASURED else verdict.text
     return f"{text[:1].upper()}{text[1:]}."
 

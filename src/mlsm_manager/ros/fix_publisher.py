@@ -41,7 +41,6 @@ class FixPublisher:
         self._matched_path = Path()
 
     def clear(self) -> None:
-        """Begin a new path."""
         self._matched_path = Path()
 
     def show(self, scan: Scan, result: MatchResult, stamp_ns: int) -> None:

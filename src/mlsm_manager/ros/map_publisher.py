@@ -85,7 +85,6 @@ class _WholeMap(rospy.SubscribeListener):
             self._guarded(peer_publish)
 
     def change(self) -> None:
-        """Remember that the map changed."""
         self._is_due = True
 
     def publish_if_due(self) -> None:
@@ -126,7 +125,6 @@ class _Tiles(rospy.SubscribeListener):
         self._is_replaced = True
 
     def publish_if_changed(self) -> None:
-        """Send what changed, if anybody listens."""
         if not self._publisher.get_num_connections():
             return
         with self._lock:
@@ -181,7 +179,6 @@ class MapPublisher:
         self.change()
 
     def _publish(self) -> None:
-        """Send what changed since the last time to those who listen."""
         self._tiles.publish_if_changed()
         for topic in self._whole:
             topic.publish_if_due()

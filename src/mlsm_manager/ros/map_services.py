@@ -44,12 +44,10 @@ class MapMarks:
         rospy.Subscriber(topics.SET_MARK, Marker, guarded(health, self._take), queue_size=_QUEUE)
 
     def all(self) -> List[Mark]:
-        """Return the marks in the order in which they were set."""
         with self._lock:
             return self._marks.all()
 
     def replace(self, marks: Iterable[Mark]) -> None:
-        """Take those of another map."""
         with self._lock:
             self._marks = Marks(marks)
             self._show()

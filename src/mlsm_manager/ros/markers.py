@@ -77,7 +77,6 @@ class BlockMarkers:
         return _array(packed)
 
     def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, int]]:
-        """Return the serialised markers of blocks, and which classes of boxes there are in each tile."""
         boxes = box_lists(blocks)
         cubes, powers = self._cubes(boxes, blocks), boxes.powers.tolist()
         frames = {power: _Frame(power, boxes.resolution, header) for power in set(powers)}
@@ -89,7 +88,6 @@ class BlockMarkers:
         return packed, kinds
 
     def _cubes(self, boxes: BoxLists, blocks: Blocks) -> Iterator[bytes]:
-        """Return the serialised points and colours of each list."""
         points, starts = boxes.centers.astype("<f8").tobytes(), boxes.starts.tolist()
         ends = list(zip(starts[:-1], starts[1:]))
         if self._color_by is ColorBy.TYPE:

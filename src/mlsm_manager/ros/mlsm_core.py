@@ -287,7 +287,6 @@ class Mapping:
 
 
 def run_mlsm_core() -> None:
-    """Run the map as a node of its own."""
     run("mlsm_core", MlsmCore.as_node)
 
 

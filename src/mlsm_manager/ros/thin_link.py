@@ -124,12 +124,10 @@ class _Latecomers(rospy.SubscribeListener):
         self._call = call
 
     def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], _peer: Callable[[Any], None]) -> None:
-        """Tell of a listener."""
         self._call()
 
 
 def _size(message: Any) -> int:
-    """Return about how many bytes a message takes."""
     if isinstance(message, Marker):
         return _HEADERS + _POINT * len(message.points)
     if isinstance(message, DiagnosticArray):

@@ -82,7 +82,6 @@ class DistributionMatcher:
         self.range_scale_deviation = range_scale_deviation
 
     def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
-        """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
         state = _prior_state(belief)
         motion = PlanarMotion(scan, self.beam_width / np.sqrt(12.0))

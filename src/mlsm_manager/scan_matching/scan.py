@@ -149,7 +149,6 @@ class MapCloud:
 
     @classmethod
     def of_scan(cls, scan: Scan) -> "MapCloud":
-        """Return the points of a scan."""
         return cls(scan.points, scan.times, scan.reference_time)
 
     @classmethod
@@ -233,7 +232,6 @@ class MatchResult:
 
     @property
     def accepted(self) -> bool:
-        """Whether the match holds."""
         return self.status is MatchStatus.CONVERGED
 
     @property

@@ -30,7 +30,6 @@ class CourseFound(NamedTuple):
 
     @property
     def is_told(self) -> bool:
-        """Whether the vehicle has a usual course."""
         return bool(np.isfinite(self.deviation))
 
     @property
@@ -96,7 +95,6 @@ def moves_are_turned(reported: Track, turn: float) -> bool:
 
 
 def course_causes(found: CourseFound) -> List[Cause]:
-    """Return that the sonar is turned, where the course shows it."""
     if found.size < _NAMED:
         return []
     angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(found.deviation):.0f} deg"

@@ -64,7 +64,6 @@ def echo_findings(
 
 
 def _reports_positions(scans: Sequence[Scan]) -> bool:
-    """Return whether the odometry knows more than the heading: without, scans do not lie on each other anyway."""
     return any(np.ptp(scan.track.poses[:, :2], axis=0).any() for scan in scans)
 
 
@@ -152,7 +151,6 @@ def delay_cause(delay: float, nats: float) -> Cause:
 
 
 def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
-    """Return whether the sonar sits elsewhere than tf says."""
     steps = np.arange(-4.0, 4.1)
     ahead = pairs.best(around(AS_TOLD, "ahead", steps))
     found = pairs.best(around(ahead, "aside", steps))

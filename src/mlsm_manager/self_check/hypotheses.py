@@ -122,7 +122,6 @@ class ScanPairs:
         return self._tracks[mirrored]
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
-        """Return the hypothesis under which scans lie closest."""
         return min(tried, key=lambda one: float(self.distances(one).mean()))
 
     @property
@@ -232,5 +231,4 @@ def _heard(scan: Scan, sonar_in_base: np.ndarray) -> _Heard:
 
 
 def around(base: Hypothesis, name: str, values: Iterable[float]) -> List[Hypothesis]:
-    """Return hypotheses that differ from `base` in the field `name`."""
     return [replace(base, **{name: float(value)}) for value in values]

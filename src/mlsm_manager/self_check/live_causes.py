@@ -32,7 +32,6 @@ class LiveCauses:
         self.clear()
 
     def clear(self) -> None:
-        """Forget the run."""
         with self._lock:
             self._scans: Deque[Scan] = deque(maxlen=_NEWEST)
             self._places: Deque[Tuple[float, float, float]] = deque(maxlen=_MOST_PLACES)

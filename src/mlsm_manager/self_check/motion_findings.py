@@ -213,7 +213,6 @@ def _needed(found: MotionFindings, fault: Fault) -> float:
 
 
 def _tells(track: Track) -> bool:
-    """Return whether an odometry says anything of the motion."""
     return bool(np.ptp(track.poses, axis=0).any())
 
 

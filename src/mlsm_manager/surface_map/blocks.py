@@ -39,12 +39,10 @@ class Blocks:
 
     @classmethod
     def uncrossed(cls, rows: np.ndarray, resolution: float) -> "Blocks":
-        """Return blocks that no beam has crossed yet."""
         return cls(rows, resolution, np.zeros(len(rows), dtype=np.uint16))
 
     @classmethod
     def none(cls, resolution: float) -> "Blocks":
-        """Return no blocks."""
         return cls.uncrossed(np.empty((0, ROW_WIDTH)), resolution)
 
     @classmethod

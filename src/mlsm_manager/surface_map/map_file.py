@@ -66,7 +66,6 @@ class StoredMap:
     marks: Sequence[Mark] = ()
 
     def __len__(self) -> int:
-        """Return the number of blocks that are occupied."""
         return sum(len(blocks) for layer, blocks in self.layers.items() if layer is not Layer.FREE)
 
     @property
@@ -96,7 +95,6 @@ def read_map(path: Path) -> StoredMap:
 
 
 def map_bytes(stored: StoredMap) -> bytes:
-    """Return the bytes of the map's file."""
     words: Dict[str, Any] = {
         "frame": stored.frame,
         "made": stored.made,

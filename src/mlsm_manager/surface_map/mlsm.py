@@ -58,7 +58,6 @@ class MultiLevelSurfaceMap:
         self._changed = ChangedTiles()
 
     def __len__(self) -> int:
-        """Return the number of blocks."""
         return len(self._store)
 
     @property
@@ -68,7 +67,6 @@ class MultiLevelSurfaceMap:
 
     @property
     def blocks(self) -> Blocks:
-        """A copy of all blocks, in no particular order."""
         return self._store.blocks(self._store.rows_in_use)
 
     def begin_copy(self) -> RunningCopy:

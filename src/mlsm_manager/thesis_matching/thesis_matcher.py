@@ -118,7 +118,6 @@ def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray
 
 
 def _runs(moving: np.ndarray) -> List[Tuple[int, int]]:
-    """Return the first index and the end of each run of equal values."""
     changes = np.flatnonzero(np.diff(moving.astype(np.int8))) + 1
     bounds = np.concatenate([[0], changes, [len(moving)]])
     return list(zip(bounds[:-1], bounds[1:]))
@@ -198,7 +197,6 @@ class ThesisMatcher:
         self.parameters = parameters
 
     def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
-        """Return where the scan was taken; see Matcher."""
         start = time.perf_counter()
         blocks, order = all_of(target), np.argsort(scan.times, kind="stable")
         scan = replace(scan, points=scan.points[order], times=scan.times[order], moving=scan.moving[order])

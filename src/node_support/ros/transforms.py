@@ -103,7 +103,6 @@ class TfBuffer:
                 self._condition.wait(left)
 
     def clear(self) -> None:
-        """Forget the transforms that change."""
         with self._condition:
             self._buffer.clear()
             self._newest_ns.clear()

@@ -68,7 +68,6 @@ class Bag:
 
     @property
     def is_ros2(self) -> bool:
-        """Whether it was recorded with ROS 2."""
         return isinstance(self._reader, Ros2Reader)
 
     def messages(self, topic: str) -> Iterator[Tuple[int, Any]]:
@@ -87,7 +86,6 @@ class Bag:
                 yield time, readers[connection.id](raw)
 
     def _deserializer(self, connection: Connection) -> Callable[[bytes], Any]:
-        """Return what turns the bytes of a connection's messages into objects."""
         store = self._store_of(connection)
         if self.is_ros2:
             return lambda raw: store.deserialize_cdr(raw, connection.msgtype)

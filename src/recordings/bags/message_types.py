@@ -38,7 +38,6 @@ def defined_in(definition: str, name: str) -> Typestore:
 
 @lru_cache(maxsize=None)
 def ros1_types() -> Typestore:
-    """Return the types of ROS 1 (Noetic) and ours."""
     return _with_ours(Stores.ROS1_NOETIC)
 
 
@@ -63,7 +62,6 @@ class StoreMessages(Messages):
         super().__init__(lambda kind: blank_message(store, kind.replace("/", "/msg/")))
 
     def time(self, stamp_ns: int) -> Any:
-        """Return a time for a header."""
         time = self.make("builtin_interfaces/Time")
         time.sec, time.nanosec = divmod(stamp_ns, 10**9)
         return time

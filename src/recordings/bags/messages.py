@@ -33,13 +33,11 @@ class Messages:
         return message
 
     def transforms(self, transforms: List[Any]) -> Any:
-        """Return the message of several transforms."""
         message = self.make("tf2_msgs/TFMessage")
         message.transforms = transforms
         return message
 
     def transform(self, pose: Placing, stamp: Any, parent: str, child: str) -> Any:
-        """Return the transform that places `child` in `parent`."""
         message = self.stamped("geometry_msgs/TransformStamped", stamp, parent)
         message.child_frame_id = child
         write_pose(message.transform.translation, message.transform.rotation, pose)

@@ -29,7 +29,6 @@ class FrameTree:
 
     @property
     def frames(self) -> List[str]:
-        """All frames, sorted."""
         return sorted({frame for link in self.tracks for frame in link})
 
     @property

@@ -29,7 +29,6 @@ _HEADINGS = ("yaw", "yaw_deg", "heading_deg")
 
 
 def is_table(path: Path) -> bool:
-    """Return whether a file is a table, by its name."""
     return path.suffix.lower() in _SUFFIXES
 
 

@@ -25,7 +25,6 @@ _QUEUE_SIZE = 1000
 
 
 def run_play_bag() -> None:
-    """Play a bag to its end."""
     options = play_arguments(rospy.myargv()[1:])
     run("play_bag", lambda: BagPlayer(options))
 
@@ -118,7 +117,6 @@ class BagPlayer:
                 return
 
     def _are_all_connected(self) -> bool:
-        """Return whether every subscriber that the master knows of is connected."""
         _, _, (_, subscribers, _) = rospy.get_master().getSystemState()
         known = {topic: len(nodes) for topic, nodes in subscribers}
         return all(

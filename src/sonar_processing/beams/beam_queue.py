@@ -43,7 +43,6 @@ class BeamQueue:
         self._most = max(NEWER_BEAMS, 2 * beams)
 
     def clear(self) -> None:
-        """Forget all beams."""
         self._waiting.clear()
 
     def frames(self) -> Dict[str, int]:

@@ -46,7 +46,6 @@ class AngleUnit(Enum):
     GRADIANS = "GRADIANS"
 
     def to_radians(self, angle: float) -> float:
-        """Return an angle of this unit in rad."""
         return angle * _RADIANS[self]
 
 

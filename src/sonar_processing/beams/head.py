@@ -103,7 +103,6 @@ class HeadWatch:
         self._ends: Deque[float] = deque(maxlen=2)
 
     def add(self, beam: Beam) -> "Counter[HeadEvent]":
-        """Add a beam and return what happened, how often."""
         events: Counter[HeadEvent] = Counter()
         last, self._last = self._last, beam
         if last is None or beam.stamp_ns < last.stamp_ns:

@@ -47,7 +47,6 @@ class OutlierRemover:
         self.parameters = parameters
 
     def __call__(self, cloud: Cloud) -> Cloud:
-        """Return the cloud without its outliers."""
         parameters = self.parameters
         if parameters.mode is OutlierMode.NONE:
             return cloud

@@ -49,7 +49,6 @@ class BeamSubscriber:
         )
 
     def unregister(self) -> None:
-        """Stop to listen."""
         self._subscriber.unregister()
         self._health.need_no_more(self._subscriber.resolved_name)
 
@@ -84,7 +83,6 @@ class BeamSubscriber:
 
 
 def _topics_instead() -> str:
-    """Return which topics hold the beams that a LaserScan was made of."""
     found = [f"{topic} ({kind})" for topic, kind in rospy.get_published_topics() if kind in {*BEAM_TYPES} - {*UNLIKELY}]
     if found:
         return f"take the beams themselves instead of the LaserScan: remap {topics.BEAMS} to {' or '.join(found)}"

@@ -33,11 +33,9 @@ class CloudPublisher:
 
     @property
     def is_read(self) -> bool:
-        """Whether anybody listens."""
         return self._stamped.get_num_connections() > 0 or self._plain.is_read
 
     def publish(self, cloud: Cloud) -> None:
-        """Send the cloud to those who listen."""
         if self._stamped.get_num_connections():
             self._stamped.publish(cloud_to_message(cloud))
         self._plain.publish(cloud)
@@ -51,11 +49,9 @@ class PointsPublisher:
 
     @property
     def is_read(self) -> bool:
-        """Whether anybody listens."""
         return self._publisher.get_num_connections() > 0
 
     def publish(self, cloud: Cloud) -> None:
-        """Send the points to those who listen."""
         if self.is_read:
             self._publisher.publish(points_to_message(cloud))
 
@@ -72,7 +68,6 @@ class FigurePublisher:
 
     @property
     def is_read(self) -> bool:
-        """Whether anybody listens."""
         return self._publisher.get_num_connections() > 0
 
     def publish(self, value: Optional[float]) -> None:

@@ -27,7 +27,6 @@ _FLOAT_BYTES = 4  # Of a FLOAT32 in a PointCloud2
 
 
 def header(stamp_ns: int, frame_id: str) -> Header:
-    """Return a header with an exact stamp."""
     return Header(stamp=genpy.Time(*divmod(int(stamp_ns), 10**9)), frame_id=frame_id)
 
 
@@ -96,7 +95,6 @@ def point_cloud(
 
 
 def cloud_to_message(cloud: Cloud) -> StampedIntensityCloud:
-    """Return the StampedIntensityCloud of a cloud."""
     return StampedIntensityCloudArrays(
         header=header(cloud.stamp_ns, cloud.frame_id),
         cloud=points_to_message(cloud),

@@ -86,7 +86,6 @@ class StageRunner:
 
 
 def run_stage(name: str) -> None:
-    """Run one stage of the table as a node of its own."""
     answer_help(name, STAGES[name].parameters)
     run(name, lambda: StageRunner.as_node(name))
 
@@ -111,7 +110,6 @@ class StageChain:
         )
 
     def process(self, scan: Cloud) -> None:
-        """Take a cloud through all stages."""
         cloud: Optional[Cloud] = scan
         for runner, topic, sinks in self._links:
             cloud = runner.process(topic, cloud)

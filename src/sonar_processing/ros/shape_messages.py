@@ -32,7 +32,6 @@ def walls_message(cloud: Cloud, lines: Sequence[Line], sonar: np.ndarray) -> msg
 
 
 def circles_message(cloud: Cloud, circles: Sequence[Circle]) -> msg.Circles:
-    """Return the circles of a scan."""
     message = msg.Circles(header=header(cloud.stamp_ns, cloud.frame_id))
     message.circles = [_circle(cloud, circle) for circle in circles]
     return message
@@ -59,7 +58,6 @@ def wall_markers(message: msg.Walls) -> MarkerArray:
 
 
 def circle_markers(message: msg.Circles) -> MarkerArray:
-    """Return a cylinder for each circle; older markers go."""
     markers = [_cleared(message.header)]
     for number, circle in enumerate(message.circles):
         cylinder = _marker(message.header, "circles", number, Marker.CYLINDER, CIRCLE_COLOR)

@@ -40,7 +40,6 @@ class RevolutionPublisher:
         self._lasers = rospy.Publisher(topics.LASER_SCANS, LaserScanArrays, queue_size=QUEUE_SIZE)
 
     def publish(self, beams: List[PlacedBeam], parameters: SonarToCloudParameters) -> None:
-        """Send a finished revolution to those who want it."""
         self._health.count("turns")
         scan = PolarScan.of(beams)
         if self._lasers.get_num_connections():

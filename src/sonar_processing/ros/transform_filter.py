@@ -199,5 +199,4 @@ class TransformFilter(message_filters.SimpleFilter):
         self._health.problem("beams without transform", f"from {beam.frame_id} to {self._target_frame}: {reason}")
 
     def _obstacle(self, beam: Beam) -> str:
-        """Why tf cannot place a beam; empty when it can."""
         return self._transforms.obstacle(self._target_frame, beam.frame_id, beam.stamp_ns)

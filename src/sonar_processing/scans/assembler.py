@@ -53,7 +53,6 @@ class ScanAssembler:
         self._last: Optional[Beam] = None
 
     def project(self, placed: PlacedBeam) -> Cloud:
-        """Return one beam as a cloud, as it is shown while the scan grows."""
         return self._cloud([self._projected([placed])], placed.beam)
 
     def add(self, placed: PlacedBeam) -> Optional[Cloud]:
@@ -96,7 +95,6 @@ class ScanAssembler:
         return self._cloud([self._projected(list(group)) for _, group in alike], last)
 
     def _projected(self, placed: List[PlacedBeam]) -> _Projected:
-        """Return beams of the same ranges as points."""
         parameters, ranges = self.parameters, placed[0].beam.ranges
         sides = 1 if parameters.mode.is_laser else parameters.dispersed_points
         poses = np.stack([one.T_target_sonar for one in placed])

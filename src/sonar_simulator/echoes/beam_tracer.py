@@ -54,7 +54,6 @@ class BeamPattern(RayPattern):
 
     @property
     def rays(self) -> int:
-        """Number of rays in one beam."""
         return self.rows * self.columns
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
@@ -89,7 +88,6 @@ class FanWithSideLobes(RayPattern):
 
     @property
     def rays(self) -> int:
-        """Number of rays in one beam."""
         return self.fan.rays + self.side_rays
 
     @property

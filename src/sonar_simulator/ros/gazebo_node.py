@@ -129,5 +129,4 @@ class GazeboSonar:
 
 
 def run_gazebo_sonar() -> None:
-    """Run gazebo_sonar."""
     run("gazebo_sonar", GazeboSonar)

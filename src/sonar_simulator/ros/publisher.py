@@ -106,7 +106,6 @@ class SimulatorPublisher:
 
     @property
     def has_listener(self) -> bool:
-        """Whether anybody subscribes to the beams."""
         return self._publishers[topics.BEAMS].get_num_connections() > 0
 
     def lacks_listeners(self) -> bool:
@@ -122,7 +121,6 @@ class SimulatorPublisher:
         )
 
     def publish_clock(self, stamp: rospy.Time) -> None:
-        """Publish the simulated time."""
         self._clock.publish(Clock(clock=stamp))
 
     def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
@@ -140,7 +138,6 @@ class SimulatorPublisher:
         self._progress.publish(Float32(data=share))
 
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
-        """Publish everything that belongs to a moment."""
         self.publish_clock(stamp)
         for topic, message in MESSAGES.at(moment, stamp, self._max_range, self._instruments, self._origin):
             self._publishers[topic].publish(message)

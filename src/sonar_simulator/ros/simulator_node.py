@@ -182,5 +182,4 @@ def _robot() -> RobotDescription:
 
 
 def run_simulator() -> None:
-    """Run sonar_simulator."""
     run("sonar_simulator", Simulator)

@@ -51,7 +51,6 @@ class RobotDescription:
 
     @property
     def fixed_joints(self) -> List[Joint]:
-        """Return the fixed joints, which belong on /tf_static."""
         return [joint for joint in self._joints.values() if joint.is_fixed]
 
     def mount(self, base: str, link: str) -> np.ndarray:

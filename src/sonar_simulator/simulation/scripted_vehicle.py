@@ -92,7 +92,6 @@ class Move(Entry):
         return np.array([self.x, self.y, self.z, math.radians(self.yaw_deg)])
 
     def duration(self) -> float:
-        """Return the duration of the move, s."""
         distance = math.sqrt(self.x**2 + self.y**2 + self.z**2)
         return self.seconds or _PEAK * max(distance / self.speed, abs(self.yaw_deg) / self.turn_rate_deg)
 
@@ -104,7 +103,6 @@ class Wait(Entry):
     wait: float = parameter(0.0, "time to stay", unit="s", low=0.0)
 
     def duration(self) -> float:
-        """Return the duration of the wait, s."""
         return self.wait
 
 

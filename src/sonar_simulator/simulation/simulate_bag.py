@@ -174,7 +174,6 @@ def _set(values: Dict[str, Any], key: str, value: Any) -> None:
 
 
 def run_simulate_bag() -> None:
-    """Run simulate_bag with the command line."""
     main(sys.argv[1:])
 
 

@@ -35,7 +35,6 @@ class SonarParameters(ParameterSet):
     ray_columns: int = parameter(10, "rays over the width of a beam", low=1, high=1000)
 
     def pattern(self) -> BeamPattern:
-        """Return the rays that these parameters describe."""
         openings = math.radians(self.vertical_opening_deg), math.radians(self.horizontal_opening_deg)
         return BeamPattern(*openings, self.ray_rows, self.ray_columns)
 

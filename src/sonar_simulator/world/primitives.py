@@ -25,7 +25,6 @@ def cylinder(radius: float, length: float) -> Mesh:
 
 
 def sphere(radius: float) -> Mesh:
-    """Return a sphere, m."""
     polar = np.linspace(0.0, np.pi, _RINGS + 1)
     return _revolved(radius * np.sin(polar), -radius * np.cos(polar))
 

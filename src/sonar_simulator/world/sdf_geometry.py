@@ -55,7 +55,6 @@ class Scope:
 
 
 def element_name(element: Element) -> str:
-    """Return the name of an element."""
     name = element.get("name") or element.findtext("name") or element.findtext("uri") or element.tag
     return name.strip()
 
@@ -127,7 +126,6 @@ def material_of(element: Element, inherited: Material) -> Material:
 
 
 def colour_of(link: Element) -> Optional[Colour]:
-    """Return the colour of a link's first visual that has one."""
     for diffuse in link.findall("visual/material/diffuse"):
         words = (diffuse.text or "").split()
         try:

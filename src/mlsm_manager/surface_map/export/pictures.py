@@ -125,7 +125,6 @@ def _pixels(blocks: Blocks, free: Blocks, color_by: ColorBy) -> tuple:
 
 
 def has_screen() -> bool:
-    """Return whether there is a screen to open a window on."""
     return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
 
 
