@@ -52,3 +52,4 @@ MATCHED_PATH = "MLSM/path"  # Path: the vehicle in the map at all matches
 SATELLITE_FIXES = "fix"  # NavSatFix: where a receiver of satellites has the vehicle, at the surface
 MAP_ORIGIN = "MLSM/origin"  # Float64MultiArray: where the map lies on the Earth
 CHART_POSITION = "MLSM/navsat"  # NavSatFix: the vehicle on the Earth now, each second
+SERVO_2015 = "charle/sonar_to_base_link_position_controller"  # namespace of the servo's controller in 2015

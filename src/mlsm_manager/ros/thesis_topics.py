@@ -9,7 +9,6 @@ from std_msgs.msg import Float64
 
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.node_table import SERVO_2015
 from node_support.ros.callbacks import MessageClasses, guarded, make_health
 from underwater_map_construction.msg import ModelCoefficients, Wall, Walls
 from underwater_map_construction.srv import SetScanMode, SetScanModeRequest, SetScanModeResponse
@@ -31,9 +30,9 @@ class ThesisTopics:
         self._joints = rospy.Publisher(topics.JOINT_STATES, JointState, queue_size=_QUEUE)
         self._pass_on(topics.MATCHED_SCAN, "debug_cloud", PointCloud2)
         self._pass_on(topics.LINES, "sonar/walls/cloud", PointCloud2)
-        self._pass_on(topics.SERVO_COMMANDS, f"{SERVO_2015}/command", Float64)
+        self._pass_on(topics.SERVO_COMMANDS, f"{topics.SERVO_2015}/command", Float64)
         self._listen(f"{topics.LINES}/coefficients", Walls, self._take_walls)
-        self._listen(f"{SERVO_2015}/state", rospy.AnyMsg, self._take_state)
+        self._listen(f"{topics.SERVO_2015}/state", rospy.AnyMsg, self._take_state)
         self._set_mode = rospy.ServiceProxy("sonar_control/set_mode", SetScanMode)
         rospy.Service("sonar_control", SetScanMode, self._serve)
 
