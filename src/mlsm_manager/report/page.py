@@ -22,14 +22,14 @@ from mlsm_manager.report.figures import (
     sensor_health,
 )
 from mlsm_manager.report.mission import Mission
-from mlsm_manager.report.page_template import PAGE, SOLID
 from mlsm_manager.self_check.verdict import Answer, Verdict
-from node_support.files import write_whole
+from node_support.files import package_folder, write_whole
 
 _NEAR = 0.75  # share of a limit from which on a figure is worth a look
 _MOST_POINTS = 800  # of a scan: more cannot be told apart on a screen
 _UNIT = 0.01  # m: points are stored as whole centimetres from the vehicle
 _FARTHEST = np.iinfo(np.int16).max * _UNIT
+_SOLID = '<h2>Map in 3-D</h2>\n<div class="turning">%s</div>\n<img class="printed" alt="The map in 3-D">\n'
 
 
 class Light(Enum):
@@ -91,7 +91,8 @@ def report_page(mission: Mission) -> str:
     of_run = Light.RED if mission.is_doubtful else light_of_run(lights)
     checks = [(_lamp(light), escape(verdict.question or verdict.name), escape(sentence(verdict)), light.value)
               for verdict, light in zip(mission.verdicts, lights)]  # fmt: skip
-    return Template(PAGE).substitute(
+    page = Template((package_folder() / "web/templates/report.html").read_text(encoding="utf-8"))
+    return page.substitute(
         title=escape(mission.title),
         plotly=get_plotlyjs(),
         summary=f"{_lamp(of_run)} {escape(mission.headline)}",
@@ -99,7 +100,7 @@ def report_page(mission: Mission) -> str:
         checks=_table(_CHECK_HEAD, checks, "checks") if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
         above=_figure(map_from_above(mission), "above"),
-        solid="" if mission.blocks.is_flat else SOLID.replace("$figure", _figure(map_in_3d(mission), "solid")),
+        solid="" if mission.blocks.is_flat else _SOLID % _figure(map_in_3d(mission), "solid"),
         correction=_figure(correction_over_time(mission), "correction"),
         health=_figure(sensor_health(mission), "health"),
         calibration=_calibration(mission),
