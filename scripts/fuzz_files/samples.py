@@ -16,7 +16,7 @@ from test_ping_viewer_next import write as write_ping_viewer_next
 from fuzz_files.logs import LogMaker
 from mlsm_manager.offline.replay import ReplayParameters, live_text
 from node_support.files import package_folder
-from sonar_simulator.simulation.simulate_bag import main as simulate_bag
+from sonar_simulator.simulation.simulate_bag import run_simulate_bag as simulate_bag
 
 FILE, OUT = "FILE", "OUT"
 """Stand in a command for the damaged file and for the folder to write to."""

@@ -122,13 +122,11 @@ def draw_turn(axes: Axes, turn: Turn) -> AxesImage:
 
 def draw_world(axes: Axes, world: World, place: Sequence[float]) -> None:
     """Draw a world's triangles, the highest last, around `place` x y z [m]."""
-    triangles = world_triangles(world)
-    corners = triangles.points.reshape(-1, 3, 3) - np.array(place)
+    points, colours = world_triangles(world)
+    corners = points.reshape(-1, 3, 3) - np.array(place)
     order = np.argsort(corners[..., 2].mean(axis=1))
     axes.add_collection(
-        PolyCollection(
-            corners[order, :, :2], facecolors=triangles.colours[::3][order], linewidths=0, antialiaseds=False
-        )
+        PolyCollection(corners[order, :, :2], facecolors=colours[::3][order], linewidths=0, antialiaseds=False)
     )
 
 

@@ -7,6 +7,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
+from node_support.geometry import matrices
 from sonar_simulator.echoes.ray_caster import Leg, Mirrors, RayCaster, legs
 from sonar_simulator.world.world import DEFAULT_MATERIAL, Material
 
@@ -143,13 +144,7 @@ class ConePattern(RayPattern):
 
 def head_turns(angles: np.ndarray) -> np.ndarray:
     """Return (beams, 3, 3) rotations from the frames of beams at head `angles` (beams,), rad, to the sonar's frame."""
-    angles = np.asarray(angles, dtype=np.float64)
-    turns = np.zeros((len(angles), 3, 3))
-    turns[:, 0, 0] = turns[:, 1, 1] = np.cos(angles)
-    turns[:, 1, 0] = np.sin(angles)
-    turns[:, 0, 1] = -turns[:, 1, 0]
-    turns[:, 2, 2] = 1.0
-    return turns
+    return matrices(np.column_stack([np.zeros((len(angles), 2)), angles]))[:, :3, :3]
 
 
 # The nearest surface may be a sliver of the beam, so its ray represents a tenth of what another ray does.

@@ -16,7 +16,7 @@ from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker
 
 from node_support import topics
-from node_support.ros.transforms import pose_from_matrix
+from recordings.bags.messages import Placing
 from sonar_simulator.simulation.moment_messages import MAP_FRAME, TOPICS, MomentMessages
 from sonar_simulator.simulation.simulation import Drive, Instruments, Moment
 from sonar_simulator.world.world import World, world_triangles
@@ -43,14 +43,14 @@ def world_marker(world: World, frame_id: str, origin: np.ndarray) -> Marker:
 
     origin: (3,) m, where the frame begins in the world.
     """
-    triangles = world_triangles(world)
+    points, colours = world_triangles(world)
     marker = Marker(ns="world", type=Marker.TRIANGLE_LIST, action=Marker.ADD, frame_locked=True)
     marker.header.frame_id = frame_id
     marker.pose = Pose(position=Point(*(-origin).tolist()), orientation=Quaternion(w=1.0))
     marker.scale = Vector3(1.0, 1.0, 1.0)
     marker.color = ColorRGBA(1.0, 1.0, 1.0, _OPACITY)
-    marker.points = [Point(*corner) for corner in triangles.points.tolist()]
-    marker.colors = [ColorRGBA(red, green, blue, _OPACITY * a) for red, green, blue, a in triangles.colours.tolist()]
+    marker.points = [Point(*corner) for corner in points.tolist()]
+    marker.colors = [ColorRGBA(red, green, blue, _OPACITY * a) for red, green, blue, a in colours.tolist()]
     return marker
 
 
@@ -70,15 +70,9 @@ class TrueSonar:
     def publish(self, T_world_sonar: np.ndarray, stamp: rospy.Time) -> None:
         """Publish where the sonar is, (4, 4)."""
         poses = {TRUE_SONAR_FRAME: T_world_sonar, MAP_FRAME: self._T_world_map}
-        self._broadcaster.sendTransform([_transform(frame, pose, stamp) for frame, pose in poses.items()])
-
-
-def _transform(frame: str, T_world_frame: np.ndarray, stamp: rospy.Time) -> TransformStamped:
-    message = TransformStamped(child_frame_id=frame)
-    message.header.stamp, message.header.frame_id = stamp, WORLD_FRAME
-    pose = pose_from_matrix(T_world_frame)
-    message.transform.translation, message.transform.rotation = pose.position, pose.orientation
-    return message
+        self._broadcaster.sendTransform(
+            [MESSAGES.transform(Placing.of(pose), stamp, WORLD_FRAME, frame) for frame, pose in poses.items()]
+        )
 
 
 _QUEUE_SIZE = 1000  # A second of every topic at the usual rates and ten times the real time

@@ -19,7 +19,7 @@ from node_support.ros.node import run
 from node_support.timing import Pace, UsualInterval
 from sonar_simulator.ros.publisher import SimulatorPublisher, TrueSonar
 from sonar_simulator.simulation.moment_messages import map_origin
-from sonar_simulator.simulation.robot import DescriptionError, RobotDescription
+from sonar_simulator.simulation.robot import RobotDescription
 from sonar_simulator.simulation.simulation import Drive, Head, Moment, Settings, make_setup
 from underwater_map_construction.msg import StampedIntensityCloud
 
@@ -177,8 +177,6 @@ def _robot() -> RobotDescription:
         return RobotDescription(rospy.get_param("robot_description"))
     except KeyError as error:
         raise ParameterError("robot_description is not set; the simulator reads the sonar's mount from it") from error
-    except DescriptionError as error:
-        raise ParameterError(str(error)) from error
 
 
 def run_simulator() -> None:

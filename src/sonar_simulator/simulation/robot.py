@@ -13,10 +13,6 @@ from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError, ParameterSet, parameter
 
 
-class DescriptionError(ValueError):
-    """A robot's description cannot be used; the text says what is missing or wrong."""
-
-
 @dataclass(frozen=True)
 class Joint:
     """A joint at its zero position: T_parent_child is (4, 4)."""
@@ -31,11 +27,11 @@ class RobotDescription:
     """The joints of a URDF."""
 
     def __init__(self, urdf: str) -> None:
-        """Raises DescriptionError if the text is not a URDF."""
+        """Raises ParameterError if the text is not a URDF."""
         try:
             root = ET.fromstring(urdf)
         except ET.ParseError as error:
-            raise DescriptionError(f"robot_description: not XML: {error}") from error
+            raise ParameterError(f"robot_description: not XML: {error}") from error
         self._joints: Dict[str, Joint] = {}
         for element in root.findall("joint"):
             joint = _joint(element)
@@ -43,18 +39,18 @@ class RobotDescription:
 
     @classmethod
     def from_file(cls, path: Path) -> "RobotDescription":
-        """Read a URDF file; raises DescriptionError."""
+        """Read a URDF file; raises ParameterError."""
         try:
             return cls(path.read_text(encoding="utf-8"))
         except (OSError, UnicodeDecodeError) as error:
-            raise DescriptionError(f"{path}: {getattr(error, 'strerror', None) or 'not a text'}") from error
+            raise ParameterError(f"{path}: {getattr(error, 'strerror', None) or 'not a text'}") from error
 
     @property
     def fixed_joints(self) -> List[Joint]:
         return [joint for joint in self._joints.values() if joint.is_fixed]
 
     def mount(self, base: str, link: str) -> np.ndarray:
-        """Return the (4, 4) T_base_link with every joint at zero; raises DescriptionError if no joints lead there."""
+        """Return the (4, 4) T_base_link with every joint at zero; raises ParameterError if no joints lead there."""
         pose, child = np.eye(4), link
         for _ in range(len(self._joints) + 1):
             if child == base:
@@ -63,14 +59,14 @@ class RobotDescription:
                 break
             pose = self._joints[child].T_parent_child @ pose
             child = self._joints[child].parent
-        raise DescriptionError(f"robot_description: no joints lead from {base} to {link}")
+        raise ParameterError(f"robot_description: no joints lead from {base} to {link}")
 
 
 def _joint(element: ET.Element) -> Joint:
     name = element.get("name", "?")
     parent, child, origin = element.find("parent"), element.find("child"), element.find("origin")
     if parent is None or child is None:
-        raise DescriptionError(f"robot_description: joint {name} has no parent or no child")
+        raise ParameterError(f"robot_description: joint {name} has no parent or no child")
     attributes = {} if origin is None else origin.attrib
     pose = pose_matrix(_numbers(attributes, "xyz", name), _numbers(attributes, "rpy", name))
     return Joint(parent.get("link", ""), child.get("link", ""), element.get("type") == "fixed", pose)
@@ -83,7 +79,7 @@ def _numbers(attributes: Dict[str, str], key: str, joint: str) -> Tuple[float, .
     except ValueError:
         values = ()
     if len(values) != 3 or not np.isfinite(values).all():
-        raise DescriptionError(f"robot_description: joint {joint}: {key} = {text!r}: must be three numbers")
+        raise ParameterError(f"robot_description: joint {joint}: {key} = {text!r}: must be three numbers")
     return values
 
 

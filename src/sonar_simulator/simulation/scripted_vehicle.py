@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, List, Mapping, NamedTuple, Protocol, Sequence, Tuple, Union
+from typing import Any, List, Mapping, NamedTuple, Protocol, Sequence, Tuple, Type, Union
 
 import numpy as np
 
@@ -37,10 +37,6 @@ class Movement(Protocol):
 _PEAK = 1.875
 # Beyond all coordinates of worlds: farther away, computing with the world's places overflows.
 _PLACE = {"unit": "m", "low": -1e8, "high": 1e8}
-
-
-class ScriptError(ValueError):
-    """A script cannot be followed; the text names entry number, key, value and what is allowed."""
 
 
 @dataclass(frozen=True)
@@ -143,12 +139,12 @@ class VehicleScript:
     def from_yaml_data(cls, moves: Any, start: Any = None) -> "VehicleScript":
         """Build from a list of mappings, keys as in `Move`, `Wait` or `Tilt`, and a mapping with keys as in `Start`.
 
-        Raises ScriptError.
+        Raises ParameterError.
         """
         if not isinstance(moves, list) or not moves:
-            raise ScriptError(f"moves = {moves!r}: must be a list with at least one entry")
-        beginning = _entry(Start, {} if start is None else start, "start")
-        entries = [_entry(_kind_of(values), values, f"entry {number}") for number, values in enumerate(moves, 1)]
+            raise ParameterError(f"moves = {moves!r}: must be a list with at least one entry")
+        beginning = Start.from_group("start", {} if start is None else start)
+        entries = [_kind_of(values).from_group(f"entry {number}", values) for number, values in enumerate(moves, 1)]
         return cls(entries, beginning.pose())
 
     @property
@@ -194,32 +190,20 @@ def _twist(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
     return np.array([cos_yaw * x + sin_yaw * y, cos_yaw * y - sin_yaw * x, z, 0.0, 0.0, turn])
 
 
-def _kind_of(values: Any) -> type:
+def _kind_of(values: Any) -> Type[Entry]:
     keys = values if isinstance(values, Mapping) else ()
     return Wait if "wait" in keys else Tilt if "tilt_deg" in keys else Move
-
-
-def _entry(kind: type, values: Any, name: str) -> Any:
-    if not isinstance(values, Mapping):
-        raise ScriptError(f"{name} = {values!r}: must be keys and values")
-    try:
-        return kind.from_mapping(values)
-    except ParameterError as error:
-        raise ScriptError(f"{name}: {error}") from error
 
 
 _KEYS = ("start", "moves")
 
 
 def load_script(path: Union[str, Path]) -> VehicleScript:
-    """Return the script in a file. Raises ScriptError, naming the file, if it cannot be read or followed."""
-    try:
-        data = read_values(Path(path))
-    except ParameterError as error:
-        raise ScriptError(str(error)) from error
+    """Return the script in a file. Raises ParameterError, naming the file, if it cannot be read or followed."""
+    data = read_values(Path(path))
     if set(data) - set(_KEYS):
-        raise ScriptError(f"{path}: must hold the keys {' and '.join(_KEYS)} and no others")
+        raise ParameterError(f"{path}: must hold the keys {' and '.join(_KEYS)} and no others")
     try:
         return VehicleScript.from_yaml_data(data.get("moves"), data.get("start"))
-    except ScriptError as error:
-        raise ScriptError(f"{path}: {error}") from error
+    except ParameterError as error:
+        raise ParameterError(f"{path}: {error}") from error

@@ -5,7 +5,7 @@ import sys
 import time
 from argparse import Namespace
 from pathlib import Path
-from typing import Any, Callable, Dict, Sequence
+from typing import Any, Callable, Dict, Optional, Sequence
 
 import numpy as np
 import yaml
@@ -18,7 +18,7 @@ from node_support.parameters import ParameterError, assigned_values, read_values
 from recordings.bags.messages import Placing
 from recordings.bags.writers import COMPRESSIONS, BagWriter
 from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
-from sonar_simulator.simulation.robot import DescriptionError, RobotDescription, tilted
+from sonar_simulator.simulation.robot import RobotDescription, tilted
 from sonar_simulator.simulation.simulation import BASE_FRAME, SONAR_FRAME, Drive, Moment, Settings, Setup, make_setup
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
@@ -111,7 +111,7 @@ examples:
 yaml/sonar_simulator_default.yaml lists the keys that --set takes."""
 
 
-def parse(arguments: Sequence[str]) -> argparse.Namespace:
+def parse(arguments: Optional[Sequence[str]]) -> argparse.Namespace:
     """Return world, script, out, parameters, set, robot, compression and quiet; exits on a bad command line."""
     parser = CommandLine(
         "simulate_bag",
@@ -173,13 +173,9 @@ def _set(values: Dict[str, Any], key: str, value: Any) -> None:
     group[keys[-1]] = value
 
 
-def run_simulate_bag() -> None:
-    main(sys.argv[1:])
-
-
-def main(arguments: Sequence[str]) -> None:
+def run_simulate_bag(arguments: Optional[Sequence[str]] = None) -> None:
     """Write the bag that a command line asks for; end with one line and status 1 where that cannot be."""
-    with ending_in_one_line("simulate_bag", ParameterError, DescriptionError):
+    with ending_in_one_line("simulate_bag", ParameterError):
         _run(parse(arguments))
 
 

@@ -7,15 +7,15 @@ from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Seque
 
 import numpy as np
 
-from node_support.parameters import ParameterError, ParameterSet, parameter
+from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.echoes.echo_model import ECHO_MODELS, EchoModelName, make_echo_model
 from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.commanded_vehicle import CommandedVehicle, VehicleParameters
 from sonar_simulator.simulation.odometry import Estimate, NoOdometry, Odometry, OdometryParameters
-from sonar_simulator.simulation.robot import DescriptionError, RobotDescription, Servo, ServoParameters, tilted
-from sonar_simulator.simulation.scripted_vehicle import Movement, ScriptError, TiltCommand, VehicleState, load_script
+from sonar_simulator.simulation.robot import RobotDescription, Servo, ServoParameters, tilted
+from sonar_simulator.simulation.scripted_vehicle import Movement, TiltCommand, VehicleState, load_script
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.world.world import World, WorldError
+from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 
 
@@ -240,12 +240,14 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
     """
     parameters = settings.simulator
     model = make_echo_model(parameters.echo_model.value, settings.echo.to_mapping())
-    script = _loaded(lambda: load_script(folder / Path(parameters.script).expanduser()))
-    T_base_sonar = _loaded(lambda: robot.mount(BASE_FRAME, SONAR_FRAME))
-    world = _loaded(lambda: _load_world(folder / Path(parameters.world).expanduser(), warn))
+    script = load_script(folder / Path(parameters.script).expanduser())
+    T_base_sonar = robot.mount(BASE_FRAME, SONAR_FRAME)
+    loaded = load_world(folder / Path(parameters.world).expanduser())
+    for warning in loaded.warnings:
+        warn(warning)
     # Separate streams, so that a change of the odometry's noise does not change the beams.
     beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
-    sonar = Sonar(_loaded(lambda: RayCaster(world)), settings.sonar.pattern(), model, beams)
+    sonar = Sonar(RayCaster(loaded.world), settings.sonar.pattern(), model, beams)
     servo = Servo(settings.servo)
     commanded = CommandedVehicle(settings.vehicle, script.start)
     is_scripted = parameters.drive is Drive.SCRIPT
@@ -253,7 +255,7 @@ def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: 
         script if is_scripted else commanded, _odometry(settings, script.pose(0.0), measurements), sonar,
         _head(settings), T_base_sonar, servo, script.tilt_commands if is_scripted else (),
     )  # fmt: skip
-    return Setup(simulation, world, sonar, servo, commanded, T_base_sonar, script.pose(0.0))
+    return Setup(simulation, loaded.world, sonar, servo, commanded, T_base_sonar, script.pose(0.0))
 
 
 def _head(settings: Settings) -> Optional[SonarHead]:
@@ -266,17 +268,3 @@ def _odometry(settings: Settings, start: np.ndarray, rng: np.random.Generator) -
     if settings.simulator.instruments is Instruments.NONE:
         return NoOdometry(start)
     return Odometry(settings.odometry, start, rng)
-
-
-def _load_world(path: Path, warn: Callable[[str], None]) -> World:
-    loaded = load_world(path)
-    for warning in loaded.warnings:
-        warn(warning)
-    return loaded.world
-
-
-def _loaded(load: Callable[[], Any]) -> Any:
-    try:
-        return load()
-    except (WorldError, ScriptError, DescriptionError) as error:
-        raise ParameterError(str(error)) from error

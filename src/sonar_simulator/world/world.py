@@ -8,10 +8,11 @@ from typing import Dict, List, Optional, Sequence, Tuple
 import numpy as np
 from scipy.spatial import ConvexHull
 
+from node_support.parameters import ParameterError
 from sonar_simulator.world.primitives import MESHES, Mesh
 
 
-class WorldError(ValueError):
+class WorldError(ParameterError):
     """A file cannot be loaded as a world; the text names the file."""
 
 
@@ -170,16 +171,11 @@ def _outline(points: np.ndarray) -> np.ndarray:
 _SHOWN = 100.0
 
 
-@dataclass(frozen=True)
-class WorldTriangles:
-    """Corners, three per triangle: points (3 m, 3) in the world frame, m, colours (3 m, 4) RGBA from 0 to 1."""
+def world_triangles(world: World) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the corners (3 m, 3) [m] of all triangles of a world, three per triangle, and their colours (3 m, 4).
 
-    points: np.ndarray
-    colours: np.ndarray
-
-
-def world_triangles(world: World) -> WorldTriangles:
-    """Return all triangles of a world; infinite planes are cut to the extent of the rest."""
+    Colours are RGBA from 0 to 1; infinite planes are cut to the extent of the rest.
+    """
     bounded = [shape for shape in world.shapes if np.isfinite(shape.size).all()]
     low, high = _extent(bounded)
     points, colours = [np.empty((0, 3))], [np.empty((0, 4), dtype=np.float32)]
@@ -188,7 +184,7 @@ def world_triangles(world: World) -> WorldTriangles:
         points.append(vertices[faces].reshape(-1, 3))
         colour = shape.material.colour if shape.colour is None else shape.colour
         colours.append(np.tile(np.array(colour, dtype=np.float32), (3 * len(faces), 1)))
-    return WorldTriangles(np.concatenate(points), np.concatenate(colours))
+    return np.concatenate(points), np.concatenate(colours)
 
 
 def _extent(shapes: list) -> Tuple[np.ndarray, np.ndarray]:

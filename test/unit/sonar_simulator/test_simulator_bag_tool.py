@@ -8,7 +8,7 @@ import rosbag
 import yaml
 
 from sonar_simulator.simulation.scripted_vehicle import load_script
-from sonar_simulator.simulation.simulate_bag import main
+from sonar_simulator.simulation.simulate_bag import run_simulate_bag
 
 ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = "moves: [{wait: 1}, {x: 2, y: 1, yaw_deg: 40, seconds: 4}, {tilt_deg: 20}, {wait: 1}]"
@@ -24,7 +24,7 @@ def script(tmp_path):
 
 def _write(tmp_path, script, name="out.bag", *arguments):
     out = tmp_path / name
-    main(["--world", "basin", "--script", str(script), "--out", str(out), *QUICK, *arguments])
+    run_simulate_bag(["--world", "basin", "--script", str(script), "--out", str(out), *QUICK, *arguments])
     return out
 
 

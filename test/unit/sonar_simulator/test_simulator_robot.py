@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_simulator.simulation.robot import DescriptionError, RobotDescription, Servo, ServoParameters, tilted
+from sonar_simulator.simulation.robot import RobotDescription, Servo, ServoParameters, tilted
 
 CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())
 CHAIN = """<robot name="r">
@@ -47,7 +47,7 @@ def test_a_mount_goes_through_all_joints_between():
     ],
 )
 def test_a_description_that_cannot_be_used_is_refused_with_what_is_wrong(urdf, text):
-    with pytest.raises(DescriptionError, match=text):
+    with pytest.raises(ParameterError, match=text):
         RobotDescription(urdf).mount("sonar" if '"hand"/><child link="base"' in urdf else "base", "hand")
 
 

@@ -9,9 +9,10 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry import pose_matrix, yaw_of
+from node_support.parameters import ParameterError
 from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.odometry import Odometry, OdometryParameters
-from sonar_simulator.simulation.scripted_vehicle import ScriptError, VehicleScript, load_script
+from sonar_simulator.simulation.scripted_vehicle import VehicleScript, load_script
 from sonar_simulator.world.world_file import load_world
 
 MOVES = [
@@ -93,7 +94,7 @@ def test_a_vehicle_is_still_while_it_waits_and_outside_the_script_only():
     ],
 )
 def test_a_bad_entry_is_refused_with_its_number_key_and_what_is_allowed(moves, text):
-    with pytest.raises(ScriptError, match=text):
+    with pytest.raises(ParameterError, match=text):
         VehicleScript.from_yaml_data(moves)
 
 
@@ -169,10 +170,10 @@ def test_the_thesis_moves_are_4_3_and_minus_8_m_of_odometry():
 def test_a_bad_file_is_refused_with_its_path(tmp_path, text, reason):
     path = tmp_path / "odd.yaml"
     path.write_text(text)
-    with pytest.raises(ScriptError, match=rf"odd\.yaml: .*{reason}"):
+    with pytest.raises(ParameterError, match=rf"odd\.yaml: .*{reason}"):
         load_script(path)
 
 
 def test_a_missing_file_is_refused_with_its_path(tmp_path):
-    with pytest.raises(ScriptError, match=r"none\.yaml: No such file"):
+    with pytest.raises(ParameterError, match=r"none\.yaml: No such file"):
         load_script(tmp_path / "none.yaml")

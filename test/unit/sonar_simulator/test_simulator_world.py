@@ -56,22 +56,21 @@ ENDLESS = Shape("floor", "plane", pose_matrix((0, 0, -3)), (math.inf, math.inf))
 
 
 def test_every_face_has_three_corners_and_their_colour():
-    triangles = world_triangles(World.from_shapes("w", [BOX]))
-    assert triangles.points.shape == (36, 3)
-    assert triangles.colours.shape == (36, 4)
-    np.testing.assert_allclose(triangles.colours[0], MATERIALS["steel"].colour)
+    points, colours = world_triangles(World.from_shapes("w", [BOX]))
+    assert (points.shape, colours.shape) == ((36, 3), (36, 4))
+    np.testing.assert_allclose(colours[0], MATERIALS["steel"].colour)
 
 
 def test_a_shape_with_a_colour_of_its_own_keeps_it():
     painted = Shape("b", "box", np.eye(4), (1.0, 1.0, 1.0), colour=(1.0, 0.0, 0.0, 0.5))
-    np.testing.assert_allclose(world_triangles(World.from_shapes("w", [painted])).colours[5], (1.0, 0.0, 0.0, 0.5))
+    np.testing.assert_allclose(world_triangles(World.from_shapes("w", [painted]))[1][5], (1.0, 0.0, 0.0, 0.5))
 
 
 def test_a_plane_without_end_is_cut_to_the_rest_of_the_world():
-    points = world_triangles(World.from_shapes("w", [ENDLESS, BOX])).points[:6]
+    points = world_triangles(World.from_shapes("w", [ENDLESS, BOX]))[0][:6]
     np.testing.assert_allclose(points.min(axis=0), (9, -2, -3))
     np.testing.assert_allclose(points.max(axis=0), (11, 2, -3))
 
 
 def test_planes_alone_are_shown_in_part():
-    assert np.ptp(world_triangles(World.from_shapes("w", [ENDLESS])).points, axis=0).tolist() == [100.0, 100.0, 0.0]
+    assert np.ptp(world_triangles(World.from_shapes("w", [ENDLESS]))[0], axis=0).tolist() == [100.0, 100.0, 0.0]
