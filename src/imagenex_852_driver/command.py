@@ -1,7 +1,7 @@
 """The switch command, 27 bytes to the head (thesis 4.1.4, manufacturer's serial interface specification)."""
 
-from dataclasses import dataclass, fields
-from typing import List
+from dataclasses import dataclass
+from typing import Container, List, NamedTuple
 
 from imagenex_852_driver.reply import HEAD_IDS, RANGES, SONAR_HEAD_ID, FrameError, ReplyKind, require
 
@@ -9,25 +9,31 @@ HEADER = b"\xfe\x44"
 TERMINATOR = 0xFD  # Bytes and codes of the manufacturer's serial interface specification
 LENGTH = 27
 
-_REVERSE_BIT = 0x40
-_TRAIN_ANGLE_OFFSET_DEG = 210
-_FREQUENCIES_KHZ = (675, 850)
-_POINTS_PER_CODE = 10
+_REVERSE_BYTE, _REVERSE_BIT = 5, 0x40
 
-_ALLOWED = {
-    "head_id": HEAD_IDS,
-    "max_range": RANGES,
-    "reverse": (False, True),
-    "start_gain_db": range(41),
-    "absorption_centi_db_per_m": range(256),
-    "train_angle_deg": range(-210, 211, 3),
-    "sector_width_deg": range(0, 361, 3),
-    "step_size_deg": range(0, 7, 3),
-    "pulse_length_us": range(1, 256),
-    "profile": (False, True),
-    "data_points": (250, 500),
-    "switch_delay_ms": range(0, 511, 2),
-    "frequency_khz": _FREQUENCIES_KHZ,
+
+class _Switch(NamedTuple):
+    """Where a setting stands in the command, and its values: `step` for each count of the byte, from `zero` on."""
+
+    byte: int
+    allowed: Container[int]
+    step: int = 1
+    zero: int = 0
+
+
+_SWITCHES = {
+    "head_id": _Switch(2, HEAD_IDS),
+    "max_range": _Switch(3, RANGES),
+    "start_gain_db": _Switch(8, range(41)),
+    "absorption_centi_db_per_m": _Switch(10, range(256)),
+    "train_angle_deg": _Switch(11, range(-210, 211, 3), 3, -210),
+    "sector_width_deg": _Switch(12, range(0, 361, 3), 3),
+    "step_size_deg": _Switch(13, range(0, 7, 3), 3),
+    "pulse_length_us": _Switch(14, range(1, 256)),
+    "data_points": _Switch(19, (250, 500), 10),
+    "profile": _Switch(22, (False, True)),
+    "switch_delay_ms": _Switch(24, range(0, 511, 2), 2),
+    "frequency_khz": _Switch(25, (675, 850), 175, 675),
 }
 
 
@@ -55,8 +61,8 @@ class SwitchCommand:
     profile: bool = False
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            require(field.name, getattr(self, field.name), _ALLOWED[field.name])
+        for name, switch in _SWITCHES.items():
+            require(name, getattr(self, name), switch.allowed)
         self.encode()
 
     @property
@@ -69,29 +75,13 @@ class SwitchCommand:
         """Return the 27 bytes of the command; raise FrameError if one of them would end it early."""
         frame = bytearray(LENGTH)
         frame[0:2] = HEADER
-        for index, value in self._switches().items():
-            if value == TERMINATOR:
-                raise FrameError(f"byte {index} of the switch command would be 253, which ends a command")
-            frame[index] = value
+        frame[_REVERSE_BYTE] = _REVERSE_BIT if self.reverse else 0
+        for name, switch in _SWITCHES.items():
+            frame[switch.byte] = (getattr(self, name) - switch.zero) // switch.step
+            if frame[switch.byte] == TERMINATOR:
+                raise FrameError(f"byte {switch.byte} of the switch command would be 253, which ends a command")
         frame[-1] = TERMINATOR
         return bytes(frame)
-
-    def _switches(self) -> dict:
-        return {
-            2: self.head_id,
-            3: self.max_range,
-            5: _REVERSE_BIT if self.reverse else 0,
-            8: self.start_gain_db,
-            10: self.absorption_centi_db_per_m,
-            11: (self.train_angle_deg + _TRAIN_ANGLE_OFFSET_DEG) // 3,
-            12: self.sector_width_deg // 3,
-            13: self.step_size_deg // 3,
-            14: self.pulse_length_us,
-            19: self.data_points // _POINTS_PER_CODE,
-            22: int(self.profile),
-            24: self.switch_delay_ms // 2,
-            25: _FREQUENCIES_KHZ.index(self.frequency_khz),
-        }
 
     @classmethod
     def decode(cls, frame: bytes) -> "SwitchCommand":
@@ -99,22 +89,8 @@ class SwitchCommand:
         require("length of the switch command", len(frame), (LENGTH,))
         require("header of the switch command", bytes(frame[:2]), (HEADER,))
         require("position of the terminator", bytes(frame).find(TERMINATOR), (LENGTH - 1,))
-        require("frequency code", frame[25], range(len(_FREQUENCIES_KHZ)))
-        return cls(
-            head_id=frame[2],
-            max_range=frame[3],
-            reverse=bool(frame[5] & _REVERSE_BIT),
-            start_gain_db=frame[8],
-            absorption_centi_db_per_m=frame[10],
-            train_angle_deg=frame[11] * 3 - _TRAIN_ANGLE_OFFSET_DEG,
-            sector_width_deg=frame[12] * 3,
-            step_size_deg=frame[13] * 3,
-            pulse_length_us=frame[14],
-            data_points=frame[19] * _POINTS_PER_CODE,
-            profile=bool(frame[22]),
-            switch_delay_ms=frame[24] * 2,
-            frequency_khz=_FREQUENCIES_KHZ[frame[25]],
-        )
+        values = {name: frame[switch.byte] * switch.step + switch.zero for name, switch in _SWITCHES.items()}
+        return cls(reverse=bool(frame[_REVERSE_BYTE] & _REVERSE_BIT), **values)
 
 
 class CommandReader:

@@ -120,7 +120,6 @@ class Emulated852(EmulatedHead):
         self._motion = HeadRotation()
 
     def receive(self, data: bytes, time: float) -> List[Transmission]:
-        """Take bytes that arrived at `time`; return what the head sends in reply, in order of time."""
         answers = []
         for command in self._reader.feed(data):
             if command.head_id == self._head_id:

@@ -122,11 +122,6 @@ def check_record_header(data: bytes) -> ReplyKind:
     raise FrameError(f"echo index of the log record = {data[3]}: must be one of 0, 2, 3")
 
 
-def record_length(kind: ReplyKind) -> int:
-    """Return the number of bytes a ping takes in the file."""
-    return _RECORD_LENGTHS[kind]
-
-
 def _encoded_stamp(stamp: Optional[float]) -> bytes:
     if stamp is None:
         return bytes(25)
@@ -222,7 +217,7 @@ class LogReader:
             ping = decode_record(self._data[position:reply_end])
         except FrameError as error:
             return None, self._next_header(position + 1, len(self._data)), str(error)
-        return self._after_fill(ping, reply_end, position + record_length(kind))
+        return self._after_fill(ping, reply_end, position + _RECORD_LENGTHS[kind])
 
     def _after_fill(self, ping: LoggedPing, start: int, end: int) -> Tuple[LoggedPing, int, str]:
         """Skip the zero fill after a ping; it ends early where the file was cut off."""

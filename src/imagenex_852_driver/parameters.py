@@ -56,7 +56,6 @@ class HeadSettings(ParameterSet):
     )  # fmt: skip
 
     def check(self) -> None:
-        """Raise ParameterError for values between the allowed steps and for a sector the head cannot scan."""
         super().check()
         self.command()
         self._check_sector()

@@ -115,7 +115,6 @@ class EmulatedPing360(EmulatedHead):
         self._command: Optional[PingMessage] = None
 
     def receive(self, data: bytes, time: float) -> List[Transmission]:
-        """Take bytes that arrived at `time`; return what the head sends in reply, in order of time."""
         answers = []
         for parsed in self._stream.feed(data):
             if time >= self._silent_until:

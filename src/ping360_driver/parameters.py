@@ -52,7 +52,6 @@ class HeadSettings(ParameterSet):
     )
 
     def check(self) -> None:
-        """Raise ParameterError for a pulse that the head cannot make, and for a sector narrower than a step."""
         super().check()
         if 0 < self.transmit_duration_us < PULSE_US[0]:
             raise ParameterError(

@@ -5,6 +5,7 @@ import threading
 import time
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, replace
+from operator import methodcaller
 from typing import Callable, ClassVar, Dict, Generic, Mapping, Optional, TypeVar
 
 from node_support.health import Health, HealthReport, Level
@@ -59,7 +60,6 @@ class DriverHealth(Health):
         self._seen: Dict[str, int] = {}
 
     def report(self) -> HealthReport:
-        """Return the state since the start, with rates since the previous report."""
         stats = self._read_stats()
         self._note(stats)
         report = super().report()
@@ -136,7 +136,7 @@ class LineDevice(ABC, Generic[Command, Ping]):
         port, self._port = self._port, None
         self._note(connected=False)
         if port is not None:
-            for farewell in (self._take_leave, _close):
+            for farewell in (self._take_leave, methodcaller("close")):
                 try:
                     with port_losses(self.connection.port):
                         farewell(port)
@@ -176,10 +176,6 @@ class LineDevice(ABC, Generic[Command, Ping]):
 
     def _take_leave(self, port: Port) -> None:
         """Leave the head in a state of rest."""
-
-
-def _close(port: Port) -> None:
-    port.close()
 
 
 class Scanner(Generic[Command, Ping]):

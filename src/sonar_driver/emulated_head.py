@@ -43,7 +43,6 @@ class FaultRates(ParameterSet):
     absence_duration: float = parameter(2.0, "time until the port is back", unit="s", low=0.0, high=600.0)
 
     def check(self) -> None:
-        """Raise ParameterError when the shares add up to more than 1."""
         total = sum(self.rate(fault) for fault in Fault)
         if total > 1.0 + 1e-9:
             shares = ", ".join(f"{fault.value} = {self.rate(fault)}" for fault in self.known())

@@ -42,7 +42,6 @@ class LineParameters(ParameterSet):
     byte_gap: float = parameter(0.1, "silence that ends part of a reply", unit="s", low=0.01, high=1.0, tunable=False)
 
     def check(self) -> None:
-        """Raise ParameterError if the first wait is longer than the longest."""
         super().check()
         if self.back_off_first > self.back_off_longest:
             raise ParameterError(

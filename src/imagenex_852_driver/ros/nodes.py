@@ -9,7 +9,7 @@ from imagenex_852_driver.reply import Reply, head_angle
 from node_support.ros.node import run
 from sonar_driver.emulated_head import EchoSource, FaultInjector
 from sonar_driver.head_server import PtyLine
-from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes
+from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes, scan_line
 from underwater_map_construction.msg import SonarScanLine
 
 
@@ -25,15 +25,7 @@ def run_emulator(world_echoes: WorldEchoes) -> None:
 
 def reply_message(reply: Reply, gain_db: int, inverted: bool) -> Optional[SonarScanLine]:
     """Return the message of a reply, without header and sensorAngle; None if it holds no echoes."""
-    if not reply.echoes:
-        return None
-    message = SonarScanLine()
-    message.angle = head_angle(reply.head_position, inverted)
-    message.intensities = reply.echoes
-    message.maxrange_meters = reply.max_range
-    message.range_resolution = reply.range_resolution
-    message.gain = gain_db
-    return message
+    return scan_line(head_angle(reply.head_position, inverted), reply.echoes, reply.range_resolution, gain_db)
 
 
 def _ping_message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:

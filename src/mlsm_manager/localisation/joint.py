@@ -79,7 +79,6 @@ class Joint(Estimator):
         super().clear()
 
     def forget_place(self) -> None:
-        """Keep the map but forget where the vehicle is, because time jumped."""
         self._end_session()
         super().forget_place()
         self._found_at = -np.inf
@@ -88,11 +87,9 @@ class Joint(Estimator):
 
     @property
     def lookahead(self) -> float:
-        """Seconds of odometry after a scan's end that it is placed better with, because beams may be late."""
         return self.parameters.lookahead
 
     def verdicts(self) -> List[Verdict]:
-        """Return whether the newest scans of the run agree with the map, and how uncertain its path has become."""
         return [] if self._session is None else self._session.verdicts()
 
     @property
@@ -104,7 +101,6 @@ class Joint(Estimator):
 
     @property
     def odometry(self) -> str:
-        """What was found out about an odometry whose kind was not named, as text for people; empty where it was."""
         if self._session is None:
             return ""
         if self._without_positions is not None and self.parameters is self._without_positions.parameters:
@@ -187,7 +183,6 @@ class Joint(Estimator):
         return ScanUpdate(scan, result, True, self.belief, forgotten=0 if session is None else session.turns_apart)
 
     def follow(self, track: Track, time: float) -> None:
-        """Bring what is known to a later `time` by the odometry; see Estimator.follow."""
         if self._session is not None and time > self.belief.time:
             self._session.follow(track, time)
         super().follow(track, time)
@@ -197,7 +192,6 @@ class Joint(Estimator):
         return -np.inf if self._session is None else self._session.known_until
 
     def _add_matched(self, cloud: MapCloud) -> CloudUpdate:
-        """Insert a cloud as a keyframe of the run; without a run it waits for one."""
         session = self._session
         if cloud.end <= self._found_at:
             return CloudUpdate(NOTHING_INSERTED, False, len(cloud))

@@ -49,7 +49,6 @@ class EstimatorParameters(OdometryChoice, JointSolverParameters):
     )  # fmt: skip
 
     def check(self) -> None:
-        """Refuse parts of turns whose headings nobody reports."""
         if self.odometry is OdometryKind.NONE and self.parts_per_turn > 1:
             raise ParameterError(
                 f"parts_per_turn = {self.parts_per_turn}: must be 1 with odometry = NONE, because parts of turns are "
@@ -239,7 +238,6 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     """All of mlsm_core's parameters, in one namespace."""
 
     def check(self) -> None:
-        """Refuse an extent that cannot be reserved, what is not installed, and a map that would correct itself."""
         super().check()
         if self.expected_blocks > MAX_PREALLOCATED_CELLS:
             raise ParameterError(
@@ -271,7 +269,6 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
 
     @property
     def chosen_map_input(self) -> MapInput:
-        """Which points make the map that is shown and saved."""
         return self.map_input
 
     @property

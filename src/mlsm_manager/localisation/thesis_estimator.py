@@ -26,10 +26,6 @@ class ThesisEstimator(Estimator):
     """
 
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
-        """Take stored maps in the place of the present ones, and forget the place; there is no run to go on with.
-
-        See Estimator.restore.
-        """
         self._take(layers)
         return ""
 

@@ -44,7 +44,6 @@ class ReplayParameters(LocaliserParameters, ReadingParameters, BeamCorrection, E
         return self.part(EchoExtractorParameters)
 
     def solver_parameters(self) -> SolverParameters:
-        """Return what these mean for the joint solver, which keeps all scans: `--refine` fits the whole run."""
         return replace(super().solver_parameters(), kept_scans=_ALL)
 
 

@@ -10,7 +10,7 @@ from ping360_driver.scan_command import bin_length, head_angle
 from sonar_driver.emulated_head import EchoSource, FaultInjector
 from sonar_driver.head_server import PtyLine, ServedLine, UdpLine
 from sonar_driver.port import datagram_address, is_datagram_port
-from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes
+from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes, scan_line
 from underwater_map_construction.msg import SonarScanLine
 
 
@@ -26,16 +26,9 @@ def run_emulator(world_echoes: WorldEchoes) -> None:
 
 def _message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:
     """Return the message of a ping; its range is what the head's own sample period makes of it."""
-    beam = ping.beam
-    if not beam.echoes:
-        return None
-    message = SonarScanLine()
-    message.angle = head_angle(beam.angle, parameters.inverted)
-    message.intensities = beam.echoes
-    message.range_resolution = bin_length(beam.pulse.sample_period, parameters.speed_of_sound)
-    message.maxrange_meters = len(beam.echoes) * message.range_resolution
-    message.gain = beam.pulse.gain_setting
-    return message
+    pulse, angle = ping.beam.pulse, head_angle(ping.beam.angle, parameters.inverted)
+    resolution = bin_length(pulse.sample_period, parameters.speed_of_sound)
+    return scan_line(angle, ping.beam.echoes, resolution, pulse.gain_setting)
 
 
 def _head(parameters: EmulatorParameters, source: EchoSource, faults: FaultInjector) -> EmulatedPing360:

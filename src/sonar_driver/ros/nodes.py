@@ -116,6 +116,18 @@ class DriverNode:
         self._thread.join(_LONGEST_STOP)
 
 
+def scan_line(angle: float, echoes: bytes, range_resolution: float, gain: int) -> Optional[SonarScanLine]:
+    """Return the message of a ping at `angle` rad with bins of `range_resolution` m, without header and sensorAngle;
+    None if it holds no echoes.
+    """
+    if not echoes:
+        return None
+    return SonarScanLine(
+        angle=angle, intensities=echoes, maxrange_meters=range_resolution * len(echoes),
+        range_resolution=range_resolution, gain=gain,
+    )  # fmt: skip
+
+
 WORLD_FRAME = "world"
 """Frame of the world file that the emulated head hears."""
 

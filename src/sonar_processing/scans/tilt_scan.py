@@ -44,7 +44,6 @@ class SonarControlParameters(BeamMessageParameters):
     joint: str = parameter("sonar_servo_joint", "name of the servo's joint in /joint_states", tunable=False)
 
     def check(self) -> None:
-        """Refuse a range in the wrong order."""
         if self.lowest_deg > self.highest_deg:
             raise ParameterError(f"lowest_deg = {self.lowest_deg}: must be at most highest_deg = {self.highest_deg}")
 

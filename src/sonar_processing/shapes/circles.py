@@ -73,7 +73,6 @@ class CircleDetectorParameters(RansacParameters):
     beam_width: float = beam_width_parameter()
 
     def check(self) -> None:
-        """Refuse radii in the wrong order."""
         if self.min_radius > self.max_radius:
             raise ParameterError(f"min_radius = {self.min_radius}: must be at most max_radius = {self.max_radius}")
 

@@ -93,11 +93,9 @@ class FanWithSideLobes(RayPattern):
 
     @property
     def rays_inside(self) -> int:
-        """Number of rays, from the first, that are between the planes."""
         return self.fan.rays
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, rays, 3) unit vectors in the frame of the beam, drawn anew for each beam."""
         jitter = rng.random((2, beams, self.side_rays))
         bearing = 2.0 * math.pi * (np.arange(self.side_rays) + jitter[0]) / max(1, self.side_rays)
         elevation = (jitter[1] - 0.5) * self.fan.vertical_opening
@@ -111,7 +109,6 @@ class FanWithSideLobes(RayPattern):
         return np.concatenate([self.fan.shares(), np.full(self.side_rays, turns / max(1, self.side_rays))])
 
     def planes(self) -> np.ndarray:
-        """Return (4, 3) inward normals of the fan's sides."""
         return self.fan.planes()
 
 

@@ -91,7 +91,6 @@ class LaserCone(ContactEcho):
     parameters: LaserConeParameters
 
     def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
         beam, ray = np.nonzero(np.isfinite(ranges))
         spread = ranges[beam, ray] + rng.normal(0.0, self.parameters.spread, size=len(beam))
         counts = self.counts(len(ranges), beam, spread)
@@ -124,7 +123,6 @@ class Collision(ContactEcho):
         return ConePattern(math.radians(self.parameters.opening_deg), fan.rays)
 
     def strengths(self, ranges: np.ndarray, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, bins) uint8 without noise for the ranges (beams, contacts) of contacts, m."""
         beam, ray = np.nonzero(np.isfinite(ranges))
         met = ranges[beam, ray]
         added = rng.normal(np.repeat(met, self.parameters.increments), self.parameters.spread)

@@ -96,7 +96,6 @@ class ServoParameters(ParameterSet):
     )
 
     def check(self) -> None:
-        """Refuse a servo that cannot turn."""
         if self.lowest_deg == self.highest_deg:
             raise ParameterError(f"lowest_deg = {self.lowest_deg}: must be below highest_deg = {self.highest_deg}")
 

@@ -79,12 +79,10 @@ class Move(Entry):
     seconds: float = parameter(0.0, "duration of the move; 0: determined by speed and turn rate", unit="s", low=0.0)
 
     def check(self) -> None:
-        """Refuse a move that goes nowhere; there is a separate entry for waiting."""
         if not self.displacement().any():
             raise ParameterError("x, y, z, yaw_deg are all 0: one must differ; to stay use wait")
 
     def displacement(self) -> np.ndarray:
-        """Return the displacement x, y, z [m] and yaw [rad]."""
         return np.array([self.x, self.y, self.z, math.radians(self.yaw_deg)])
 
     def duration(self) -> float:
