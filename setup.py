@@ -10,7 +10,7 @@ HERE = Path(__file__).resolve().parent
 NAME = "underwater_map_construction"
 # What the modules need beside them; node_support/files.py finds it.
 SHARED = (
-    "package.xml", "migration/names_2015.yaml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*", "web/*.*",
+    "package.xml", "migration/*.yaml", "urdf/*", "worlds/*.sdf", "worlds/models/*/*", "yaml/*", "web/*.*",
     "web/templates/*",
 )  # fmt: skip
 

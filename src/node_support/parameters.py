@@ -17,17 +17,19 @@ import dataclasses
 import math
 from difflib import get_close_matches
 from enum import Enum
+from functools import lru_cache
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar
 
 import yaml
 
-from node_support.old_keys import GONE, OLD_VALUES, RENAMED
+from node_support.files import package_folder
 
 EXPERT = "expert"
 """The key under which yaml files and the parameter server hold the parameters for experts."""
 OLD_KEYS = "parameters of an older version"
 """Begins the warning that names them."""
+_OLD_VALUES = {("estimator", "SCAN_BY_SCAN"): "JOINT"}  # values of today by key and older value
 _METADATA_KEY = "parameter"
 Self = TypeVar("Self", bound="ParameterSet")
 Part = TypeVar("Part", bound="ParameterSet")
@@ -119,16 +121,17 @@ class ParameterSet:
                 raise ParameterError(f"{key!r} = {given[key]!r}: no such parameter; names are words")
         found, remarks = {key: value for key, value in given.items() if key in known}, []
         for key in [key for key in given if key not in known]:
-            if RENAMED.get(key) in known:
-                found[RENAMED[key]] = given[key]
-                remarks.append(f"{key} -> {RENAMED[key]}")
-            elif key in GONE:
-                remarks.append(f"{key} -> nothing ({GONE[key]})")
+            renamed, gone = (old_keys()[what].get(key) for what in ("renamed", "gone"))
+            if renamed in known:
+                found[renamed] = given[key]
+                remarks.append(f"{key} -> {renamed}")
+            elif gone:
+                remarks.append(f"{key} -> nothing ({gone})")
             else:
                 raise ParameterError(f"{key} = {given[key]!r}: no such parameter; {_names_like(key, known)}")
         for key, value in found.items():
-            if isinstance(value, str) and (key, value) in OLD_VALUES:
-                found[key] = OLD_VALUES[key, value]
+            if isinstance(value, str) and (key, value) in _OLD_VALUES:
+                found[key] = _OLD_VALUES[key, value]
                 remarks.append(f"{key} = {value} -> {found[key]}")
         return found, remarks
 
@@ -171,6 +174,12 @@ class ParameterSet:
     def tunable_fields(cls) -> Tuple[dataclasses.Field, ...]:
         """Return the fields that may change while the node runs."""
         return tuple(field for field in dataclasses.fields(cls) if describe(field).tunable)
+
+
+@lru_cache(maxsize=None)
+def old_keys() -> Mapping[str, Mapping[str, str]]:
+    """Return what migration/old_keys.yaml says: of `renamed` keys the names of today, of those `gone` why."""
+    return yaml.safe_load((package_folder() / "migration/old_keys.yaml").read_text(encoding="utf-8"))
 
 
 def config_name(node: str) -> str:

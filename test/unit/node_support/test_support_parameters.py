@@ -115,8 +115,8 @@ def test_plain_values_are_nested_as_they_are_taken():
 
 
 def test_keys_of_older_versions_are_taken_over_or_left_out_and_named(monkeypatch):
-    monkeypatch.setitem(parameters_module.RENAMED, "reach", "radius")
-    monkeypatch.setitem(parameters_module.GONE, "engine", "there is one engine")
+    old = {"renamed": {"reach": "radius"}, "gone": {"engine": "there is one engine"}}
+    monkeypatch.setattr(parameters_module, "old_keys", lambda: old)
     values, remarks = ExampleParameters.by_name({"radius": 1.0, "reach": 2.0, "engine": "steam"})
     assert values == {"radius": 2.0}
     assert remarks == ["reach -> radius", "engine -> nothing (there is one engine)"]
