@@ -126,7 +126,6 @@ class DeadReckoner:
         self.clear()
 
     def clear(self) -> None:
-        """Forget everything, because time jumped."""
         self._position = np.zeros(3)
         self._stamp_ns: Optional[int] = None
         self._yaw = 0.0

@@ -63,7 +63,6 @@ class HeadRotation:
             self.clockwise = not self.clockwise
 
     def step(self, command: SwitchCommand) -> None:
-        """Turn to the position of the next ping."""
         width = _positions(command.sector_width_deg)
         low = AHEAD + _positions(command.train_angle_deg) - width // 2
         size = _positions(command.step_size_deg)

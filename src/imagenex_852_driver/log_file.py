@@ -48,7 +48,6 @@ class LoggedPing:
 
     @classmethod
     def of(cls, stamp: float, command: SwitchCommand, reply: Reply) -> "LoggedPing":
-        """Return the log's form of a ping of the driver."""
         return cls(
             reply=reply,
             stamp=stamp,

@@ -40,7 +40,6 @@ class NodeDescription:
 
     @classmethod
     def of(cls, row: Dict[str, Any]) -> "NodeDescription":
-        """Return that of a row of the table."""
         return cls(row["summary"], tuple(_interface(*fields) for fields in row["interfaces"]))
 
 

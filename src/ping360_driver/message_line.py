@@ -68,7 +68,6 @@ class MessageLine:
         self.discard()
 
     def discard(self) -> None:
-        """Forget everything that has been received so far."""
         while self._port.in_waiting and not self._stop.is_set():
             self._port.read(self._port.in_waiting)
         self._stream = MessageStream()
@@ -98,7 +97,6 @@ class MessageLine:
         return self._arrived.popleft() if self._arrived else None
 
     def take_broken(self) -> int:
-        """Return the number of broken messages since the last call."""
         number = self._stream.broken - self._broken_taken
         self._broken_taken = self._stream.broken
         return number

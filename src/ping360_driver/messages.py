@@ -114,7 +114,6 @@ class MessageStream:
 
     @property
     def pending(self) -> bool:
-        """Whether there are bytes that may be the beginning of a message."""
         return bool(self._buffer)
 
     @property
@@ -139,7 +138,6 @@ class MessageStream:
         return found
 
     def reset(self) -> None:
-        """Give up waiting for the rest of a message."""
         if self._buffer:
             self._skip_rubbish(len(self._buffer))
         self._begin_stretch()

@@ -98,7 +98,6 @@ def information_request() -> bytes:
 
 
 def motor_off() -> bytes:
-    """Return the message that ends a scan and switches the motor off."""
     return packed(MessageId.MOTOR_OFF)
 
 
@@ -202,7 +201,6 @@ class DeviceInformation:
 
     @property
     def can_auto_transmit(self) -> bool:
-        """Whether its firmware can scan a sector by itself."""
         return self.firmware > _LAST_WITHOUT_AUTO_TRANSMIT
 
 

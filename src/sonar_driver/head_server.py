@@ -51,11 +51,9 @@ class PtyLine:
         self._master = self._slave = None
 
     def fileno(self) -> int:
-        """Return the descriptor that becomes readable when bytes arrive."""
         return self._master
 
     def read(self) -> bytes:
-        """Return the bytes that have arrived, possibly none."""
         with contextlib.suppress(BlockingIOError):
             return os.read(self._master, _READ_SIZE)
         return b""
@@ -88,11 +86,9 @@ class UdpLine:
             self._socket = None
 
     def fileno(self) -> int:
-        """Return the descriptor that becomes readable when bytes arrive."""
         return self._socket.fileno()
 
     def read(self) -> bytes:
-        """Return the bytes of the next datagram, possibly none."""
         with contextlib.suppress(BlockingIOError, ConnectionError):
             data, self._peer = self._socket.recvfrom(_LONGEST_DATAGRAM)
             return data

@@ -44,7 +44,6 @@ class Cloud:
 
     @property
     def is_organized(self) -> bool:
-        """Whether rows are beams and columns are bins."""
         return self.organized or self.height > 1
 
     @property

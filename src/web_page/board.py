@@ -56,7 +56,6 @@ class Board:
                 page.drop(known)
 
     def clear(self) -> None:
-        """Forget all, because another run begins."""
         with self.lock:
             self.drop(list(self._items))
 

@@ -78,7 +78,6 @@ class _File(StaticFileHandler):
     """A file of the page; tornado gives none from outside of its folder."""
 
     def set_extra_headers(self, path: str) -> None:
-        """Add what every answer carries."""
         for name, value in _HEADERS.items():
             self.set_header(name, value)
 

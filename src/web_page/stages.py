@@ -48,7 +48,6 @@ class Stages:
 
 
 def counts(values: Mapping[str, str]) -> List[Tuple[str, str, str]]:
-    """Return name, total and rate of what a stage counts."""
     names = [name for name in values if name + _RATE in values][:_MOST_VALUES]
     return [(name[:_LONGEST], values[name][:_LONGEST], values[name + _RATE][:_LONGEST]) for name in names]
 

@@ -36,7 +36,6 @@ def run_player() -> None:
 
 
 def run_recorder() -> None:
-    """Record a log until Ctrl-C."""
     options = record_arguments(rospy.myargv()[1:])
     run("record_852", lambda: LogRecorder(options))
 

@@ -55,7 +55,6 @@ class JointSession:
 
     @property
     def solver(self) -> LiveSolver:
-        """The solver that is believed."""
         return self.hypotheses.shown
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
@@ -99,7 +98,6 @@ class JointSession:
         return cls(Hypotheses.begun(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def solved_with(self, parameters: SolverParameters) -> "JointSession":
-        """Return a run of the same scans with other parameters."""
         other = JointSession(self.hypotheses.begun_with(parameters), self.T_map_odom)
         for scan in self.scans:
             other._add(scan)

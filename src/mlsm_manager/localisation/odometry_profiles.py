@@ -301,5 +301,4 @@ def strafes(ahead: LiveSolver, hovering: LiveSolver) -> bool:
 
 
 def profile_values(kind: OdometryKind) -> Dict[str, Any]:
-    """Return the parameters of mlsm_core that a profile sets."""
     return {"odometry": kind.value, **{setting.key: setting.value for setting in PROFILES[kind]}}

@@ -107,7 +107,6 @@ class LocaliserParameters(
         return Assumed(other.solver_parameters(), other.part(OdometryErrors))
 
     def solver_parameters(self) -> SolverParameters:
-        """Return what these mean for the joint solver."""
         return SolverParameters(
             **{field.name: getattr(self, field.name) for field in fields(JointSolverParameters)},
             odometry=self.odometry_model(),
@@ -122,7 +121,6 @@ class LocaliserParameters(
         return np.inf if measured or alone else self.rate_correlation_time * self.parts_per_turn
 
     def localiser_settings(self) -> LocaliserSettings:
-        """Return the settings that a localiser can take over while it runs."""
         return LocaliserSettings(
             self.build_matcher(), self._searching(EVERYWHERE), self.blend_time, self.chosen_map_input
         )
@@ -152,12 +150,10 @@ class LocaliserParameters(
 
     @property
     def chosen_map_input(self) -> MapInput:
-        """Which points make the map that is shown and saved."""
         return MapInput.MATCHED
 
     @property
     def expected_blocks(self) -> int:
-        """Number of blocks to reserve memory for."""
         return 0
 
 
@@ -273,5 +269,4 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
 
     @property
     def expected_blocks(self) -> int:
-        """Cells of the reserved extent."""
         return int(self.size_x_meters / self.resolution) * int(self.size_y_meters / self.resolution)

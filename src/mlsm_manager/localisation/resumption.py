@@ -36,7 +36,6 @@ class StoredPlace:
     belief: Belief
 
     def arrays(self) -> Dict[str, np.ndarray]:
-        """Return it as arrays that a map's file keeps."""
         belief = self.belief
         return {
             "T_map_odom": self.correction,
@@ -94,7 +93,6 @@ class StoredRun:
     matched: Covered
 
     def arrays(self) -> Dict[str, np.ndarray]:
-        """Return it as arrays that a map's file keeps."""
         scans = [replace(scan, moving=scan.moving.astype(np.uint8)) for scan in self.scans]
         parts = {
             "T_map_odom": self.T_map_odom,

@@ -34,7 +34,6 @@ class ContinuousOdometry:
         self.clear()
 
     def clear(self) -> None:
-        """Forget everything, because time jumped."""
         self.steps: List[Step] = []
         self.trembling: List[Step] = []
         self._starts = [-np.inf]

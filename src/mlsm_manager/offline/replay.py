@@ -165,7 +165,6 @@ class Replayed:
 
     @property
     def matched(self) -> int:
-        """Scans whose match was accepted."""
         return sum(update.accepted and update.result is not None for update in self.updates)
 
     @property
@@ -185,7 +184,6 @@ class Replayed:
 
     @property
     def rejected(self) -> int:
-        """Scans whose match was not accepted."""
         return sum(not update.accepted for update in self.updates)
 
 

@@ -41,7 +41,6 @@ def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: 
 
 
 def summary_lines(summary: Dict[str, Any], options: Namespace) -> List[str]:
-    """Return what map_bag prints at its end."""
     alone = summary["scans"] - summary["matched"] - summary["rejected"]
     lines = [
         f"{counted(summary['scans'], 'scan')}, {summary['matched']} matched, {summary['rejected']} rejected, "

@@ -65,7 +65,6 @@ class OdometryFound(NamedTuple):
 
     @property
     def name(self) -> str:
-        """What people call it."""
         if self.motion in (None, SweepMotion.MOVING):
             return self.kind.value.lower()
         names = {SweepMotion.STILL: "standing", SweepMotion.DRIFTING: "drifting"}

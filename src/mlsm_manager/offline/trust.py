@@ -46,7 +46,6 @@ class Trust:
 
     @property
     def line(self) -> str:
-        """What the checks say, as one line for people."""
         begin = float(self.times[0])
         fine, doubtful, missing = ([one for one in self.verdicts if one.answer is answer] for answer in Answer)
         wrong = [cause.line(begin) for cause in self.causes if not cause.is_mended]

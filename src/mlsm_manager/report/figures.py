@@ -125,7 +125,6 @@ def correction_over_time(mission: Mission) -> go.Figure:
 
 
 def sensor_health(mission: Mission) -> go.Figure:
-    """Return echoes and missing beams of every scan."""
     times = np.array([scan.time for scan in mission.scans]) - mission.start
     echoes = [len(scan.points) for scan in mission.scans]
     figure = go.Figure(go.Bar(x=times, y=[scan.missing for scan in mission.scans], name="missing beams", yaxis="y2"))

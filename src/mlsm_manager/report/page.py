@@ -59,7 +59,6 @@ class _Quantity:
         return f"{self.number(value)} {self.more if value >= 0.0 else self.less}"
 
     def number(self, value: float) -> str:
-        """Return the amount with its unit."""
         return f"{abs(value) * self.factor:.{self.digits}f} {self.unit}"
 
 

@@ -54,7 +54,6 @@ def occupancy_grid(grid: Raster, stamp_ns: int, frame_id: str) -> OccupancyGrid:
 
 
 def has_octomap_messages() -> bool:
-    """Return whether octomap_msgs and OctoMap's own library are installed."""
     return find_spec("octomap_msgs") is not None and find_spec("pyoctomap") is not None
 
 
@@ -117,7 +116,6 @@ class _Tiles(rospy.SubscribeListener):
         self._publisher = rospy.Publisher(topics.MAP_MARKERS, MarkerArray, subscriber_listener=self, queue_size=10)
 
     def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], peer_publish: Callable[[Any], None]) -> None:
-        """Send all to who comes."""
         self._send_all(peer_publish)
 
     def replace(self) -> None:

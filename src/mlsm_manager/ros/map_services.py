@@ -153,7 +153,6 @@ def _left_out(turns: int) -> str:
 
 
 def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, marks: MapMarks, run: str = "") -> StoredMap:
-    """Return the map as a file keeps it, made now."""
     stored = localiser.stored(parameters.map_frame, parameters.calibration, time.time(), run)
     return replace(stored, marks=marks.all())
 

@@ -291,5 +291,4 @@ def run_mlsm_core() -> None:
 
 
 def run_mapping() -> None:
-    """Run everything from beams to map in one process."""
     run("mapping", Mapping)

@@ -37,7 +37,6 @@ class OdometryTrack:
         return self._transforms.clock.stood
 
     def clear(self) -> None:
-        """Forget the past, because time jumped."""
         self._transforms.clear()
 
     def track(self, start: float, times: np.ndarray, end: float, lookahead: float = 0.0) -> Track:

@@ -87,7 +87,6 @@ _REVERSED = {
 
 
 def turn_text(found: Hypothesis) -> str:
-    """Return what is said of a mount."""
     if found.mirrored is not Mirror.NOTHING and found.is_over:
         return _REVERSED[found.mirrored]
     if found.mirrored is not Mirror.NOTHING:

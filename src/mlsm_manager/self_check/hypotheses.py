@@ -69,7 +69,6 @@ class ScanPairs:
 
     @property
     def tell(self) -> bool:
-        """Whether there are enough pairs between which the vehicle moved."""
         return len(self._pairs) >= _FEWEST_PAIRS
 
     @property

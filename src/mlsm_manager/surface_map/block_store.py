@@ -293,7 +293,6 @@ class RunningCopy:
 
     @property
     def is_complete(self) -> bool:
-        """Whether nothing is left to copy."""
         return self._done == len(self._copy[1])
 
     def before_change(self, rows: np.ndarray) -> None:

@@ -131,7 +131,6 @@ class BlockSource(Protocol):
 
 
 def all_of(source: BlockSource) -> Blocks:
-    """Return all blocks of a source."""
     return source.in_box(np.full(2, -np.inf), np.full(2, np.inf))
 
 

@@ -205,7 +205,6 @@ class Overlay:
         return Covered(cells_of_keys(self._cells), self._held.rows, self._held.crossed)
 
     def lay(self, blocks: Blocks) -> None:
-        """Insert blocks into the map."""
         self._remember(blocks.keys)
         self._map.insert_blocks(blocks)
 

@@ -27,7 +27,6 @@ class Messages:
         self.make = make
 
     def stamped(self, kind: str, stamp: Any, frame: str) -> Any:
-        """Return a new message of a type that has a header."""
         message = self.make(kind)
         message.header.stamp, message.header.frame_id = stamp, frame
         return message
@@ -52,6 +51,5 @@ class Messages:
 
 
 def write_pose(place: Any, turn: Any, pose: Placing) -> None:
-    """Write a pose into the two parts of a message that hold it."""
     place.x, place.y, place.z = pose.shift
     turn.x, turn.y, turn.z, turn.w = pose.turn

@@ -47,7 +47,6 @@ class SweepMotion(Enum):
 
     @property
     def is_motion(self) -> bool:
-        """Whether they tell that the vehicle did not stand still."""
         return self in (SweepMotion.DRIFTING, SweepMotion.MOVING)
 
 

@@ -46,7 +46,6 @@ class BeamQueue:
         self._waiting.clear()
 
     def frames(self) -> Dict[str, int]:
-        """Return the number of waiting beams of each frame."""
         return Counter(entry.beam.frame_id for entry in self._waiting)
 
     def add(self, beam: Beam, is_moving: bool) -> Optional[WaitingBeam]:

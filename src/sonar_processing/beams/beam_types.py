@@ -185,7 +185,6 @@ class BeamType:
 
     @property
     def name(self) -> str:
-        """The first of its names."""
         return self.names[0]
 
     def reader(self, image_range: float) -> Callable[[Any], List[BeamFields]]:

@@ -95,7 +95,6 @@ class HeadWatch:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew with the next beam."""
         self._last: Optional[Beam] = None
         self._step = 0.0
         self._swept = 0.0

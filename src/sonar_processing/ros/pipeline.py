@@ -104,7 +104,6 @@ class StageChain:
         self._links = [(runner, topic, sinks.get(runner.type.outputs[topic], ())) for runner, topic in links]
 
     def is_wanted(self) -> bool:
-        """Return whether anybody takes anything that the stages make."""
         return any(
             runner.is_read(topic) or any(sink.is_wanted() for sink in sinks) for runner, topic, sinks in self._links
         )

@@ -42,14 +42,12 @@ class SonarImage(rospy.SubscribeListener):
         self._picture = PolarImage(parameters)
 
     def peer_subscribe(self, *_: object) -> None:
-        """Begin to draw for the first subscriber."""
         with self._lock:
             if self._beams is None:
                 self._clear()
                 self._beams = BeamSubscriber(self._take, self._live.current, self.health, self._clear)
 
     def peer_unsubscribe(self, _topic: str, others: int) -> None:
-        """Stop when the last subscriber has gone."""
         with self._lock:
             if others == 0 and self._beams is not None:
                 self._beams.unregister()

@@ -132,7 +132,6 @@ class RevolutionCollector:
         return len(self._beams)
 
     def clear(self) -> None:
-        """Forget the unfinished turn."""
         self._beams.clear()
         self._turn.clear()
 

@@ -51,7 +51,6 @@ class PolarImage:
         self.clear()
 
     def clear(self) -> None:
-        """Begin a new picture with the next beam."""
         self._canvas: Optional[_Canvas] = None
         self._drawn_for = (0, 0.0)
         self._last_angle: Optional[float] = None

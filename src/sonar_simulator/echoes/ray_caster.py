@@ -34,7 +34,6 @@ class RayCaster:
 
     @cached_property
     def nearest(self) -> NearestSurface:
-        """Finds the nearest surface inside a beam."""
         return NearestSurface(self.world)
 
     def hits(self, origins: np.ndarray, directions: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

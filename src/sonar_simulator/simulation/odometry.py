@@ -45,7 +45,6 @@ class NoOdometry:
         self._pose[:2, 3] = 0.0
 
     def estimate(self, time: float, state: VehicleState) -> Estimate:
-        """Return the same at any time."""
         return Estimate(self._pose, np.zeros(6))
 
 

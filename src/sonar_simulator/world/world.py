@@ -122,7 +122,6 @@ class World:
 
     @classmethod
     def from_shapes(cls, name: str, shapes: Sequence[Shape]) -> "World":
-        """Join the triangles of all shapes into one mesh."""
         vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int32)]
         materials: Dict[Material, int] = {}
         face_material = [np.empty(0, dtype=np.intp)]
