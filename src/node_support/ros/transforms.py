@@ -4,7 +4,7 @@ import math
 import threading
 import time
 from collections import deque
-from typing import Callable, Deque, Dict, Iterator, Optional, Tuple
+from typing import Callable, Deque, Dict, Hashable, Iterator, Optional, Tuple
 
 import genpy
 import numpy as np
@@ -20,7 +20,36 @@ from node_support.geometry import quaternion_of, rotation_matrices
 from node_support.headers import DAY, check_frame, check_stamp
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
-from node_support.standing_clock import StandingClock
+
+_FEWEST = 5  # changes under one stamp: some publishers correct what they have just said
+_MOST_TOLD = 100
+
+
+class StandingClock:
+    """Watches the stamps [ns] of senders whose messages differ.
+
+    stood: from which stamp to which one [s] a clock went on after it had stood: what happened meanwhile looks sudden.
+    """
+
+    def __init__(self) -> None:
+        self.stood: Deque[Tuple[float, float]] = deque(maxlen=_MOST_TOLD)
+        self._newest: Dict[Hashable, Tuple[int, object, int]] = {}
+
+    def take(self, sender: Hashable, stamp_ns: int, said: object) -> bool:
+        """Learn a message; return whether it is the one that shows that its clock stands."""
+        stamp, before, changes = self._newest.get(sender, (0, said, 0))
+        if stamp_ns != stamp:
+            if changes >= _FEWEST and stamp_ns > stamp:
+                self.stood.append((stamp * 1e-9, stamp_ns * 1e-9))
+            changes = 0
+        elif said != before:
+            changes += 1
+        self._newest[sender] = stamp_ns, said, changes
+        return stamp_ns == stamp and said != before and changes == _FEWEST
+
+    def stands_at(self, stamp_ns: int) -> bool:
+        return any(changes >= _FEWEST and stamp <= stamp_ns for stamp, _, changes in list(self._newest.values()))
+
 
 JUMP_BACK = 1.0
 """Stamps that go back by more than this [s] mean that time jumped; messages overtake each other by less."""

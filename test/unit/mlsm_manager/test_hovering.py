@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 from made_harbour import CANAL, along_canal, tour
 from made_models import followed
 
+from mlsm_manager.hovering.best_fit import ShiftSearch, stretched_mean
 from mlsm_manager.hovering.compiled_particles import Echoes
 from mlsm_manager.hovering.particle_filter import (
     FADING,
@@ -22,7 +23,6 @@ from mlsm_manager.hovering.particle_filter import (
 )
 from mlsm_manager.hovering.particles import ACROSS, ALONG, AROUND, FARTHEST, Particles, drawn, led
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
-from mlsm_manager.hovering.shift_search import ShiftSearch, stretched_mean
 from mlsm_manager.joint_solver.batch_solver import fit_path
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.velocity_models import AHEAD, ASIDE
