@@ -8,7 +8,7 @@ import argparse
 import inspect
 import sys
 from pathlib import Path
-from typing import Dict, List, Type
+from typing import Dict, Type
 
 import yaml
 from from_2015 import from_2015_tables
@@ -18,10 +18,9 @@ from autopilot_link.parameters import AutopilotLinkParameters
 from dead_reckoning.dead_reckoner import DeadReckoningParameters
 from imagenex_852_driver.emulated_852 import EmulatorParameters
 from imagenex_852_driver.parameters import DriverParameters
-from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, PROFILES, OdometryKind, Setting, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from node_support.node_table import NODES, NodeDescription
-from node_support.parameters import EXPERT, ParameterSet, config_name
+from node_support.parameters import ParameterSet, config_name
 from node_support.thin_queue import ThinLinkParameters
 from ping360_driver.emulated_ping360 import EmulatorParameters as Ping360EmulatorParameters
 from ping360_driver.parameters import DriverParameters as Ping360DriverParameters
@@ -101,8 +100,6 @@ def generated() -> Dict[Path, str]:
     groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS, "thin_link": {}, "web_page": {}}
     for name, parameters in START_UP_NODES.items():
         texts[ROOT / f"yaml/{name}_default.yaml"] = start_up_yaml(name, parameters, groups[name])
-    for kind in OdometryKind:
-        texts[ROOT / f"yaml/odometry_{kind.value.lower()}.yaml"] = profile_yaml(kind)
     for name, stage in STAGES.items():
         words = {"name": name, "config": config_name(name), "summary": inspect.getdoc(stage.build).splitlines()[0]}
         texts[ROOT / f"nodes/{name}"] = EXECUTABLE.format(**words)
@@ -115,29 +112,6 @@ def generated() -> Dict[Path, str]:
         # What stands before the first generated heading is written by hand.
         texts[path] = path.read_text().partition(tables[: tables.index("\n") + 1])[0] + tables
     return texts
-
-
-def profile_yaml(kind: OdometryKind) -> str:
-    """Return the text of a profile's yaml file, for the launch files' argument `odometry`.
-
-    Where the odometry is made from the solver's velocities, it also says how dead_reckoning lets them fade.
-    """
-    experts = MlsmCoreParameters.expert_names()
-    lines = [f"# Written by scripts/document. The launch files load it with odometry:={kind.value.lower()}."]
-    lines += ["mlsm_core:", f"  odometry: {kind.value}"]
-    lines += [line for one in PROFILES[kind] if one.key not in experts for line in _setting(one, "  ")]
-    lines += [f"  {EXPERT}:"]
-    lines += [line for one in PROFILES[kind] if one.key in experts for line in _setting(one, "    ")]
-    if kind in COMPASS_ONLY:
-        fading = Setting(
-            "velocity_fading", profile_values(kind)["rate_correlation_time"], "s: rate_correlation_time above"
-        )
-        lines += ["dead_reckoning:", *_setting(fading, "  ")]
-    return "\n".join(lines) + "\n"
-
-
-def _setting(setting: Setting, indent: str) -> List[str]:
-    return [f"{indent}# {setting.reason}", f"{indent}{setting.key}: {yaml.safe_dump(setting.value).splitlines()[0]}"]
 
 
 def nodes_sections() -> str:

@@ -1,8 +1,9 @@
-"""Which odometry a vehicle has: for each kind its model of the motion, and values of parameters with their reasons."""
+"""Which odometry a vehicle has: for each kind its model of the motion, and where the values of its parameters are."""
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Callable, Dict, NamedTuple, Optional, Sequence
+from functools import lru_cache
+from typing import Any, Callable, Dict, Mapping, Optional
 
 import numpy as np
 
@@ -26,7 +27,8 @@ from mlsm_manager.joint_solver.velocity_models import (
     UnaidedOdometry,
 )
 from mlsm_manager.scan_matching.prediction import OdometryErrors
-from node_support.parameters import parameter
+from node_support.files import package_folder
+from node_support.parameters import EXPERT, parameter, read_values
 
 # s and rad: stand for a heading that no compass holds; only the walk of the turn rate moves it.
 _FOR_EVER = 1e6
@@ -157,14 +159,6 @@ def _speeds(own: OdometryChoice) -> Speeds:
     )
 
 
-def _dvl(own: OdometryChoice) -> OdometryModel:
-    return DvlFactors(DvlOdometry(**_positions(own)))
-
-
-def _auto(own: OdometryChoice) -> OdometryModel:
-    return UnsureFactors(DvlOdometry(**_positions(own)), _DOUBT)
-
-
 def _thrusters(own: OdometryChoice) -> OdometryModel:
     scale_walk = min(own.scale_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0)
     current = {"current_deviation": own.current_deviation, "current_walk": own.current_walk}
@@ -181,106 +175,12 @@ def _none(own: OdometryChoice) -> OdometryModel:
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {
-    OdometryKind.AUTO: _auto,
-    OdometryKind.DVL: _dvl,
+    OdometryKind.AUTO: lambda own: UnsureFactors(DvlOdometry(**_positions(own)), _DOUBT),
+    OdometryKind.DVL: lambda own: DvlFactors(DvlOdometry(**_positions(own))),
     OdometryKind.THRUSTERS: _thrusters,
     OdometryKind.HEADING: _heading,
     OdometryKind.HOVERING: _heading,
     OdometryKind.NONE: _none,
-}
-
-
-class Setting(NamedTuple):
-    """A value of a parameter of mlsm_core, and why it is that."""
-
-    key: str
-    value: Any
-    reason: str
-
-
-_COMPASS = (
-    Setting("heading_deviation", 0.0175, "1 degree: a compass's data sheet, iron near it included"),
-    Setting("turn_rate_deviation", 7e-5, "the drift of its gyro between two fixes of the compass is far below that"),
-)
-_JOINT = Setting("estimator", "JOINT", "the newest scans find their poses together")
-_NEIGHBOURS = Setting("scans_per_group", 1, "where little is known of the motion, the scan before is what tells most")
-_NORMALS = Setting("normal_deviation", 0.2, "rad: of a straight wall's normals, as a beam of 2.5 degrees hears it")
-_POSTS = Setting("post_confidence", 1.0, "posts and buoys tell the way where walls do not")
-_NOT_REPORTED = (
-    Setting("scale_deviation", 0.0, "no distances are reported"),
-    Setting("direction_deviation", 0.0, "no directions of motion are reported"),
-)
-_TRAVEL = (
-    Setting("start_speed_deviation", 0.3, "m/s: the usual speed of a small vehicle; set 0.02 for a standing start"),
-    Setting("travel_walk", 0.005, "m/s per root second: the speed of travel may change by 0.1 m/s in 7 minutes"),
-)
-_UNREPORTED = (
-    *_NOT_REPORTED,
-    Setting("speed_deviation", 0.15, "m/s: by as much a small vehicle changes its speed while it works"),
-    Setting("rate_correlation_time", 40.0, "s: as long such a change lasts, a turn or a manoeuvre"),
-    *_TRAVEL,
-    Setting("slip_deviation", 0.07, "m/s: vehicles go ahead; they slip in turns and in a slow current"),
-    Setting("slip_correlation_time", 20.0, "s: a turn"),
-    _NEIGHBOURS,
-    _NORMALS,
-    _POSTS,
-)
-
-_POSITIONS = (
-    _JOINT,
-    Setting("scale_deviation", 0.01, "a DVL's data sheet, speed of sound included"),
-    Setting("direction_deviation", 0.1, "rad: the angle at which it is mounted, set by eye to 6 degrees"),
-    Setting("speed_deviation", 0.025, "m/s: noise of its velocities"),
-    Setting("rate_correlation_time", 12.0, "s: as long that noise lasts"),
-    Setting("motion_correlation_time", 10000.0, "s: scale and mounting hardly change during a mission"),
-    *_COMPASS,
-)
-
-PROFILES: Dict[OdometryKind, Sequence[Setting]] = {
-    OdometryKind.AUTO: _POSITIONS,
-    OdometryKind.DVL: _POSITIONS,
-    OdometryKind.THRUSTERS: (
-        _JOINT,
-        Setting("scale_deviation", 0.3, "the speed at a thrust is known to a third"),
-        Setting("direction_deviation", 0.1, "rad: thrusters push ahead to some degrees"),
-        Setting("speed_deviation", 0.02, "m/s: what a command leaves open"),
-        Setting("rate_correlation_time", 60.0, "s: as long that lasts"),
-        Setting(
-            "motion_correlation_time",
-            3600.0,
-            "s: the scale changes with the battery and with what hangs on the vehicle",
-        ),
-        Setting("current_deviation", 0.05, "m/s: a current in sheltered water"),
-        Setting("current_walk", 0.002, "m/s per root second: the current may change by 0.05 m/s in ten minutes"),
-        _NEIGHBOURS,
-        _NORMALS,
-        _POSTS,
-        *_COMPASS,
-    ),
-    OdometryKind.HEADING: (_JOINT, *_UNREPORTED, *_COMPASS),
-    OdometryKind.HOVERING: (
-        _JOINT,
-        *_NOT_REPORTED,
-        Setting("speed_deviation", 0.5, "m/s: such a vehicle goes ahead and back"),
-        Setting("rate_correlation_time", 10.0, "s: as long as it keeps a speed"),
-        *_TRAVEL,
-        Setting("slip_deviation", 0.5, "m/s: it strafes as fast as it goes ahead"),
-        Setting("slip_correlation_time", 10.0, "s: as long as it keeps a speed"),
-        Setting(
-            "parts_per_turn", 3, "a turn of the head lasts longer than it takes such a vehicle to change its speed"
-        ),
-        _NEIGHBOURS,
-        Setting("normal_deviation", 0.1, "rad: half of heading's, so that the little that parts of a turn hear counts"),
-        _POSTS,
-        *_COMPASS,
-    ),
-    OdometryKind.NONE: (
-        _JOINT,
-        *_UNREPORTED,
-        Setting("heading_deviation", 0.0, "no compass"),
-        Setting("turn_rate_deviation", 0.05, "rad/s: 3 degrees per second, a small vehicle's usual turn"),
-        Setting("turn_rate_correlation_time", 10.0, "s: as long such a turn lasts"),
-    ),
 }
 
 
@@ -300,5 +200,9 @@ def strafes(ahead: LiveSolver, hovering: LiveSolver) -> bool:
     return best_fit.strafes(ahead, hovering)
 
 
-def profile_values(kind: OdometryKind) -> Dict[str, Any]:
-    return {"odometry": kind.value, **{setting.key: setting.value for setting in PROFILES[kind]}}
+@lru_cache(maxsize=None)
+def profile_values(kind: OdometryKind) -> Mapping[str, Any]:
+    """Return the parameters of mlsm_core that the yaml file of a profile sets, by their names."""
+    values = read_values(package_folder() / f"yaml/odometry_{kind.value.lower()}.yaml")["mlsm_core"]
+    experts = values.pop(EXPERT)
+    return {**values, **experts}
