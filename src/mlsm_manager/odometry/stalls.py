@@ -57,6 +57,16 @@ def standing_stretches(track: Track, first_column: int = 0) -> Iterator[Tuple[in
             yield first, last
 
 
+def stands_suddenly(track: Track, first: int, last: int) -> bool:
+    """Return whether a position that stands from pose `first` to `last` stops or starts as no vehicle does."""
+    rates = _rates_before(track, first)
+    if len(rates) < 2:
+        return False
+    usual = np.median(rates, axis=0)
+    starts = (_speeds(usual) > _GOES) & _goes_on_at_once(track, last, usual)
+    return bool(_stops_at_once(rates)[0] or starts[0])
+
+
 def oldest_that_tells(track: Track) -> int:
     """Return from which pose on a track tells whether its end is a stall, and how the vehicle went just before."""
     stands = np.flatnonzero(_moves(track))[-1:] + 1
@@ -100,7 +110,7 @@ def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
         goes = stops[0] or _speeds(again)[0] > _GOES[0]
     else:
         missed = usual * seconds
-        at_once, trembles = (stops & (_speeds(again) > _AS_BEFORE * _speeds(usual))).any(), _trembles(rates[:, 2])
+        at_once, trembles = (stops & _goes_on_at_once(track, last, usual)).any(), _trembles(rates[:, 2])
         goes = at_once or trembles if times[last] - times[first] < _STANDS_FOR else at_once and trembles
     return Stall(first, last + 1, missed, usual * step, kind, seconds) if goes else None
 
@@ -112,10 +122,22 @@ def _rates_before(track: Track, first: int) -> np.ndarray:
     return seen_from(poses[:-1], poses[1:]) / np.diff(times)[:, np.newaxis]
 
 
+def _goes_on_at_once(track: Track, last: int, usual: np.ndarray) -> np.ndarray:
+    """Return whether a vehicle goes and turns (2,) in the step after pose `last` as by `usual` (3,)."""
+    if last + 1 == len(track.times):
+        return np.array([False, False])
+    again = seen_from(track.poses[last], track.poses[last + 1]) / (track.times[last + 1] - track.times[last])
+    return _speeds(again) > _AS_BEFORE * _speeds(usual)
+
+
 def _stops_at_once(rates: np.ndarray) -> np.ndarray:
-    """Return whether a vehicle that went by `rates` (k, 3) went and turned (2,) in the last step as in those before."""
+    """Return whether a vehicle that went by `rates` (k, 3) went and turned (2,) in the last steps as in those before.
+
+    In the last two: of a pose the position may stand before the heading does.
+    """
     usual = _speeds(np.median(rates, axis=0))
-    return (usual > _GOES) & (_speeds(rates[-1]) > _AS_BEFORE * usual)
+    last = np.maximum(_speeds(rates[-1]), _speeds(rates[-2]))
+    return (usual > _GOES) & (last > _AS_BEFORE * usual)
 
 
 def _steered(before: np.ndarray, after: np.ndarray, times: np.ndarray, headings: np.ndarray) -> np.ndarray:

@@ -5,7 +5,7 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.odometry.mending import is_heading_measured, stuck_headings
-from mlsm_manager.odometry.stalls import standing_stretches
+from mlsm_manager.odometry.stalls import standing_stretches, stands_suddenly
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, of_stuck
 from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs
@@ -24,7 +24,7 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
     Where it tells no positions, those in which it stands though the vehicle went on. path: (m, >= 2) m, the way that it
     went by the solver.
     """
-    stretches = [(float(track.times[first]), float(track.times[last])) for first, last in standing_stretches(track)]
+    stretches = list(standing_stretches(track))
     reports_positions = bool(np.ptp(track.poses[:, :2], axis=0).any())
     if not reports_positions:
         stuck = stuck_headings(track.with_poses(np.column_stack([path[:, :2], track.poses[:, 2]])))
@@ -32,17 +32,15 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
             return [of_stuck(*one) for one in stuck]
     if not stretches or (not reports_positions and len(stretches) > _STRAIGHT):
         return []
-    times, apart = _pairs(scans)
-    if not len(times):
-        return []
-    inside = [(times[:, 0] >= begin) & (times[:, 1] <= end) for begin, end in stretches]
+    (times, apart), spans = _pairs(scans), track.times[np.array(stretches)]
+    inside = [apart[(times[:, 0] >= begin) & (times[:, 1] <= end)] for begin, end in spans]
     # What such a stretch moved unseen lies between the two scans of a pair that reaches into it.
-    outside = [(times[:, 1] <= begin) | (times[:, 0] >= end) for begin, end in stretches]
-    elsewhere, seems = apart[np.all(outside, axis=0)], _seems_frozen if is_heading_measured(track) else _moves
+    outside = [(times[:, 1] <= begin) | (times[:, 0] >= end) for begin, end in spans]
+    elsewhere, is_measured = apart[np.all(outside, axis=0)], is_heading_measured(track)
     return [
-        _cause(begin, end, apart[within], elsewhere)
-        for (begin, end), within in zip(stretches, inside)
-        if seems(apart[within], elsewhere)
+        _cause(*span, within, elsewhere)
+        for stretch, span, within in zip(stretches, spans, inside)
+        if (_seems_frozen(track, stretch, within, elsewhere) if is_measured else _moves(within, elsewhere))
     ]
 
 
@@ -51,12 +49,13 @@ def _moves(within: np.ndarray, elsewhere: np.ndarray) -> bool:
     return _lie_apart(within, elsewhere, _FEWEST_PAIRS, _FARTHER)
 
 
-def _seems_frozen(within: np.ndarray, elsewhere: np.ndarray) -> bool:
+def _seems_frozen(track: Track, stretch: Tuple[int, int], within: np.ndarray, elsewhere: np.ndarray) -> bool:
     """Return whether a pose that elsewhere trembles stands though scans do not show that the vehicle does.
 
-    Along a straight wall they lie on each other wherever the vehicle goes.
+    Along a straight wall they lie on each other wherever the vehicle goes. Where the stretch is too short for a pair of
+    scans, it must begin and end as suddenly as no vehicle stops.
     """
-    return _lie_apart(within, elsewhere, 1, _AT_ONE_PLACE)
+    return _lie_apart(within, elsewhere, 1, _AT_ONE_PLACE) if len(within) else stands_suddenly(track, *stretch)
 
 
 def _lie_apart(within: np.ndarray, elsewhere: np.ndarray, fewest: int, share: float) -> bool:
@@ -66,8 +65,10 @@ def _lie_apart(within: np.ndarray, elsewhere: np.ndarray, fewest: int, share: fl
 
 
 def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) -> Cause:
-    noise = max(float(elsewhere.std()) / np.sqrt(len(within)), 1e-2)
-    nats = 0.5 * (float(within.mean() - elsewhere.mean()) / noise) ** 2
+    nats = 0.0
+    if len(within):
+        noise = max(float(elsewhere.std()) / np.sqrt(len(within)), 1e-2)
+        nats = 0.5 * (float(within.mean() - elsewhere.mean()) / noise) ** 2
     text = f"odometry frozen for {end - begin:.0f} s{' while the echoes move' if _moves(within, elsewhere) else ''},"
     return Cause(text, _CERTAIN + nats, begin, metres=_SPEED * (end - begin))
 

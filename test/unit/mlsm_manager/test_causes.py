@@ -154,6 +154,17 @@ def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehi
     assert standing_causes(still, stands, stands.poses) == []
 
 
+@pytest.mark.parametrize(("slowing", "named"), [(0.0, True), (5.0, False)])
+def test_a_measured_pose_that_stands_is_named_frozen_where_no_scans_tell_if_it_stood_suddenly(slowing, named):
+    """From 40 to 60 s it stands; `slowing` s before and after, its speed goes down and up evenly."""
+    times = np.arange(0.0, 101.0, 0.1)
+    until = np.maximum(np.abs(times - 50.0) - 10.0, 0.0)
+    speeds = 0.3 * np.clip(until / max(slowing, 1e-9), 0.0, 1.0)
+    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * (until > 0.0)
+    track = Track(times, np.column_stack([0.1 * np.cumsum(speeds), np.zeros(len(times)), noise]))
+    assert [cause.text for cause in standing_causes([], track, track.poses)] == ["odometry frozen for 20 s,"] * named
+
+
 @pytest.mark.parametrize(("measured", "step", "named"), [(True, 0.7, True), (False, 0.7, False), (True, 0.1, False)])
 def test_a_measured_pose_that_stands_is_named_frozen_unless_scans_show_that_the_vehicle_stands(measured, step, named):
     """Four scans a metre apart while the odometry goes, six `step` [m] apart while it stands, as along a wall."""
