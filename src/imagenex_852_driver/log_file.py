@@ -206,6 +206,7 @@ class LogReader:
         self._note_damage(damage_start, len(self._data), reason)
 
     def _record_at(self, position: int) -> Tuple[Optional[LoggedPing], int, str]:
+        """Return the ping at `position`, where to continue, and what is wrong there."""
         header = self._data[position : position + HEADER_LENGTH]
         try:
             kind = check_record_header(header)

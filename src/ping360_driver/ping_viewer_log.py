@@ -75,6 +75,7 @@ class PingViewerLog:
             return len(self._data) if first is None else first
 
     def _part(self, position: int) -> Tuple[Optional[LoggedPart], int]:
+        """Return the part at `position`, if there is one, and where to continue."""
         found = self._time(position)
         if found is not None:
             time, start = found
@@ -87,6 +88,7 @@ class PingViewerLog:
         return None, len(self._data) if following is None else following
 
     def _next_time(self, start: int, end: int) -> Optional[int]:
+        """Return where from `start` on, and before `end`, the next part begins."""
         places = (one.start() for one in _TEXT_LENGTH.finditer(self._data, start, end + 3))
         return next((place for place in places if self._time(place) is not None), None)
 

@@ -45,6 +45,7 @@ class Outcome:
             self.interrupted, self.error = 1, ""
 
     def counts(self) -> Dict[str, int]:
+        """Return what is added to the counts of the device."""
         replies = int(self.beam is not None)
         return {"pings": replies + self._without_beam(), "replies": replies, **{n: getattr(self, n) for n in _COUNTS}}
 

@@ -85,6 +85,7 @@ def _survey_of_bag(path: Path, bag: Bag, request: Request) -> Survey:
 
 
 def _assumed(motion: Optional[Motion], recorded: RecordedBeams, request: Request, missing: List[str]) -> List[str]:
+    """Return what is assumed of motion and beams, and add to what is missing."""
     assumed = [*(motion.notes if motion is not None else []), *recorded.notes]
     if motion is not None and recorded.beams:
         _look_at_place(motion, recorded, request, assumed, missing)

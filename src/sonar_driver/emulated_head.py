@@ -54,6 +54,7 @@ class FaultRates(ParameterSet):
 
     @classmethod
     def known(cls) -> Tuple[Fault, ...]:
+        """Return the faults that these heads can have."""
         names = {field.name for field in fields(cls)}
         return tuple(fault for fault in Fault if fault.value in names)
 

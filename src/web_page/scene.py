@@ -110,6 +110,7 @@ class Scene:
         self._fixes.take(row)
 
     def take_map(self, now: float, points: np.ndarray, counts: np.ndarray, cell: float) -> None:
+        """Take the blocks of the map, see `MapTiles.take`."""
         seconds = self._since_start(now)
         if cell != self._cell:
             self._cell = cell
@@ -118,6 +119,7 @@ class Scene:
         self._tiles.take(points, counts, cell, seconds)
 
     def take_beam(self, beam: Beam, T_base_sonar: np.ndarray, T_map_sonar: np.ndarray) -> None:
+        """Take a beam, see `SonarDisc.take`."""
         self._heard["beams"] = self._clock()
         self._disc.take(beam, T_base_sonar, T_map_sonar)
 

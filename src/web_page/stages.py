@@ -48,11 +48,13 @@ class Stages:
 
 
 def counts(values: Mapping[str, str]) -> List[Tuple[str, str, str]]:
+    """Return name, total and rate of what a stage counts."""
     names = [name for name in values if name + _RATE in values][:_MOST_VALUES]
     return [(name[:_LONGEST], values[name][:_LONGEST], values[name + _RATE][:_LONGEST]) for name in names]
 
 
 def checks(values: Mapping[str, str]) -> List[Tuple[str, str, str]]:
+    """Return name, answer and reason of each check."""
     found = []
     for name, value in values.items():
         answer = next((answer for answer in _ANSWERS if value.startswith(answer)), None)

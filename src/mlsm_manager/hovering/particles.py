@@ -109,6 +109,7 @@ class Particles(NamedTuple):
         return (offset * weights[:, np.newaxis]).T @ offset
 
     def selected(self, rows: np.ndarray) -> "Particles":
+        """Return the particles in `rows` (m,)."""
         return Particles(self.paths[rows], self.speeds[rows], self.log_weights[rows])
 
     def continued(self, ends: np.ndarray, speeds: np.ndarray, longest: int) -> "Particles":

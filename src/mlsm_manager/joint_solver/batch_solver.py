@@ -229,6 +229,7 @@ class _Batch:
         return equations
 
     def met(self) -> Tuple[PlacedPoints, Pairs]:
+        """Return all points and their comparisons."""
         parameters = self._parameters
         _, (points,) = across_weak([self._run.placed(self._points)], parameters)
         if self._lists is None:

@@ -178,6 +178,7 @@ class Hypotheses:
 
     @property
     def _names(self) -> Tuple[str, str]:
+        """Names of the odometry that is shown, and of the other one."""
         unsure, mixture = self._unsure, self._unsure.odometry.mixture
         names = mixture.likeliest(unsure.told).name, mixture.rival.name
         return names if self.shown is unsure else names[::-1]

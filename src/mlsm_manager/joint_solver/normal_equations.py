@@ -55,6 +55,7 @@ class Layout:
         object.__setattr__(self, "size", self.run_start + RUN_COLUMNS)
 
     def node_start(self, node: np.ndarray) -> np.ndarray:
+        """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
 
     @property

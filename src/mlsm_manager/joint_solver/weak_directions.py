@@ -102,6 +102,7 @@ def _in_common(sums: np.ndarray) -> np.ndarray:
 
 
 def _weakest(sums: np.ndarray) -> np.ndarray:
+    """Return the eigenvectors (..., 2) of the smaller eigenvalues of symmetric matrices (..., 2, 2)."""
     angles = 0.5 * np.arctan2(2.0 * sums[..., 0, 1], sums[..., 0, 0] - sums[..., 1, 1])
     return np.stack([-np.sin(angles), np.cos(angles)], axis=-1)
 

@@ -55,6 +55,7 @@ class JointSession:
 
     @property
     def solver(self) -> LiveSolver:
+        """The solver that is believed."""
         return self.hypotheses.shown
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:

@@ -106,6 +106,7 @@ class KeyframeMap:
         return carved
 
     def _carved(self, points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> Optional[CarveReport]:
+        """As `carve` while only what is settled is in the map."""
         report, noted = self._free.carve(self._map, points, times, origins)
         if self._stretches is not None and noted is not None:
             self._stretches.note_free(noted)

@@ -100,10 +100,12 @@ class Cluster:
 
 
 def _versions() -> Dict[str, str]:
+    """Return the versions on which the bytes of a map depend."""
     return {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
 
 
 def _look(folder: Path) -> Tuple[Dict[str, str], bool]:
+    """Return what a worker has, and whether it sees a folder."""
     return _versions(), folder.is_dir()
 
 

@@ -200,6 +200,7 @@ def _track(tree: FrameTree, stamps: np.ndarray, near_ns: np.ndarray, path: Path,
 
 
 def _placed(recorded: RecordedBeams, tree: FrameTree, path: Path, request: Request) -> Tuple[List[PlacedBeam], int]:
+    """Return the beams with their places, in the order of their stamps, and how many have none."""
     odom, stamps = request.motion.odom_frame, recorded.stamps_ns
     of_frame: Dict[str, List[int]] = {}
     for index, beam in enumerate(recorded.beams):

@@ -161,6 +161,7 @@ class Replayed:
 
     @property
     def solver(self) -> Optional[LiveSolver]:
+        """The one of them that is believed."""
         return self.estimator.solver
 
     @property

@@ -77,6 +77,7 @@ class BlockMarkers:
         return _array(packed)
 
     def _packed(self, blocks: Blocks, header: Header) -> Tuple[List[bytes], Dict[Tile, int]]:
+        """Return the serialised markers of blocks, and which classes of boxes there are in each tile."""
         boxes = box_lists(blocks)
         cubes, powers = self._cubes(boxes, blocks), boxes.powers.tolist()
         frames = {power: _Frame(power, boxes.resolution, header) for power in set(powers)}

@@ -39,6 +39,7 @@ class Blocks:
 
     @classmethod
     def uncrossed(cls, rows: np.ndarray, resolution: float) -> "Blocks":
+        """Return blocks that no beam has crossed yet."""
         return cls(rows, resolution, np.zeros(len(rows), dtype=np.uint16))
 
     @classmethod

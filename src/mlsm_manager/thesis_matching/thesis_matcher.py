@@ -118,6 +118,7 @@ def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray
 
 
 def _runs(moving: np.ndarray) -> List[Tuple[int, int]]:
+    """Return the first index and the end of each run of equal values."""
     changes = np.flatnonzero(np.diff(moving.astype(np.int8))) + 1
     bounds = np.concatenate([[0], changes, [len(moving)]])
     return list(zip(bounds[:-1], bounds[1:]))

@@ -126,6 +126,7 @@ def material_of(element: Element, inherited: Material) -> Material:
 
 
 def colour_of(link: Element) -> Optional[Colour]:
+    """Return the colour of a link's first visual that has one."""
     for diffuse in link.findall("visual/material/diffuse"):
         words = (diffuse.text or "").split()
         try:
