@@ -38,7 +38,7 @@ def measured(seconds: float, picture: Optional[Path]) -> List[Row]:
         doubts: List[str] = []
         rospy.Subscriber("/MLSM/status", PositionStatus, lambda one: doubts.extend([one.text] if one.state else []))
         peer = Peer(connection, clock=lambda: rospy.get_rostime().to_nsec())
-        say("the vehicle dives; nothing is sent before three fixes agree: about a minute")
+        say("the vehicle dives; nothing is sent before seven fixes agree: about two minutes")
         wait_until(lambda: peer.of_type("ODOMETRY"), "a position")
         say(f"positions come: measuring for {seconds:g} s")
         doubts.clear()

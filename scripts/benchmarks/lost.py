@@ -2,7 +2,7 @@
 
 Each map is drawn with an exact odometry, whole or of the first part of a tour. A vehicle is then put into it at many
 moments of another tour of the same water, with an odometry of usual errors in a frame of its own. It takes scans until
-its position is called good, at most ten. A position is wrong if it is off by more than 3 m and by more than four times
+its position is called good, at most fifteen. A position is wrong if it is off by more than 3 m and by more than four times
 what is stated. After half of a tour some vehicles are where the map has nothing: these should not be called good.
 """
 
@@ -24,7 +24,7 @@ from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.surface_map.map_file import StoredMap
 
-_MOST_SCANS = 10
+_MOST_SCANS = 15
 _WRONG, _SURE = 3.0, 4.0  # m, stated deviations
 _FAR = 100.0  # m, by which the odometry's frame is elsewhere
 _NOWHERE = 1e4  # m, where no map is
