@@ -2,8 +2,8 @@
 
 Each map is drawn with an exact odometry, whole or of the first part of a tour. A vehicle is then put into it at many
 moments of another tour of the same water, with an odometry of usual errors in a frame of its own. It takes scans until
-its position is called good, at most fifteen. A position is wrong if it is off by more than 3 m and by more than four times
-what is stated. After half of a tour some vehicles are where the map has nothing: these should not be called good.
+its position is called good, at most fifteen. A position is wrong if it is off by more than 3 m and by more than four
+times what is stated. After half of a tour some vehicles are where the map has nothing: these should not be called good.
 """
 
 from functools import partial
