@@ -86,7 +86,7 @@ def steps() -> List[Step]:
         _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
         *oldest_versions(),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
-        _pytest("long tests", "test/unit", "-m", "long", *IN_PARALLEL, load=Load.SPARE),
+        _pytest("long tests", *_long(), "-m", "long", *IN_PARALLEL, load=Load.SPARE),
         _pytest("recordings", "test/recordings", load=Load.SPARE),
         _pytest("documentation", "test/documentation", load=Load.SPARE),
         _damaged_files(),
@@ -97,6 +97,11 @@ def steps() -> List[Step]:
         _pytest("soak", "test/soak", load=Load.SHARED),
         *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"), key=_by_length)),
     ]
+
+
+def _long() -> List[str]:
+    """Return the files with long tests: to import all others takes seconds."""
+    return [str(path) for path in sorted((ROOT / "test/unit").rglob("test_*.py")) if "mark.long" in path.read_text()]
 
 
 def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:

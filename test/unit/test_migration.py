@@ -14,6 +14,8 @@ from old_bag import old_type
 from sonar_processing.ros.conversions import header, point_cloud
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
+pytestmark = pytest.mark.newest_only("rosbag runs with ROS's own Python")
+
 ROOT = Path(__file__).resolve().parents[2]
 RULES = ROOT / "migration" / "avora_msgs.bmr"
 START = genpy.Time(1400000000, 123456789)

@@ -155,19 +155,24 @@ def test_a_recording_with_the_heading_alone_is_known_as_that_and_mapped(tmp_path
     assert np.ptp(trajectory["corrected_x"]) > 1.0
 
 
-def test_an_odometry_that_was_said_overrules_what_the_recording_looks_like(tmp_path):
-    done = run(BASIN, "--out", tmp_path, "--odometry", "thrusters")
+@pytest.fixture(scope="module")
+def told(tmp_path_factory):
+    """Return the folder of a run that is told its odometry and some parameters, and what it said."""
+    folder = tmp_path_factory.mktemp("told")
+    (folder / "mine.yaml").write_text("sonar_delay: 0.25\nfree_scans: 20\n")
+    changes = ["--set", "range_scale=0.99", "--no-calibrate", "--odometry", "thrusters"]
+    done = run(BASIN, "--out", folder / "out", "--parameters", folder / "mine.yaml", *changes)
     assert done.returncode == 0, done.stderr
-    assert "odometry: thrusters, because --odometry or a parameter says so" in done.stdout
-    assert yaml.safe_load((tmp_path / "live.yaml").read_text())["mlsm_core"]["odometry"] == "THRUSTERS"
+    return folder / "out", done.stdout
 
 
-def test_parameters_of_a_file_are_taken_and_held(tmp_path):
-    (tmp_path / "mine.yaml").write_text("sonar_delay: 0.25\nfree_scans: 20\n")
-    changes = ["--set", "range_scale=0.99", "--no-calibrate"]
-    done = run(BASIN, "--out", tmp_path / "out", "--parameters", tmp_path / "mine.yaml", *changes)
-    assert done.returncode == 0, done.stderr
-    cloud = yaml.safe_load((tmp_path / "out" / "live.yaml").read_text())["sonar_to_cloud"]
+def test_an_odometry_that_was_said_overrules_what_the_recording_looks_like(told):
+    assert "odometry: thrusters, because --odometry or a parameter says so" in told[1]
+    assert yaml.safe_load((told[0] / "live.yaml").read_text())["mlsm_core"]["odometry"] == "THRUSTERS"
+
+
+def test_parameters_of_a_file_are_taken_and_held(told):
+    cloud = yaml.safe_load((told[0] / "live.yaml").read_text())["sonar_to_cloud"]
     assert (cloud["sonar_delay"], cloud["range_scale"]) == pytest.approx((0.25, 0.99), abs=1e-6)
 
 
