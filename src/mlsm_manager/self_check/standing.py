@@ -9,6 +9,7 @@ from mlsm_manager.odometry.stalls import standing_stretches, stands_suddenly
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, of_stuck
 from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs
+from node_support.geometry import wrapped
 
 _FEWEST_PAIRS = 3
 _CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose itself says that nobody measured it
@@ -16,6 +17,7 @@ _STRAIGHT = 2  # stretches of one heading, without positions: more are straight 
 _FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
 _AT_ONE_PLACE = 0.4  # times as far: simulated vehicles that stopped had .06 to .25, one that went along a wall .57
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle
+_ANY_TURN = np.pi / 2.0  # rad: the mean size of a turn that may be any
 
 
 def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> List[Cause]:
@@ -38,7 +40,7 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
     outside = [(times[:, 1] <= begin) | (times[:, 0] >= end) for begin, end in spans]
     elsewhere, is_measured = apart[np.all(outside, axis=0)], is_heading_measured(track)
     return [
-        _cause(*span, within, elsewhere)
+        _cause(*span, within, elsewhere, _missed_turn(track, *span))
         for stretch, span, within in zip(stretches, spans, inside)
         if (_seems_frozen(track, stretch, within, elsewhere) if is_measured else _moves(within, elsewhere))
     ]
@@ -64,13 +66,26 @@ def _lie_apart(within: np.ndarray, elsewhere: np.ndarray, fewest: int, share: fl
     return float(np.median(within)) > share * float(np.median(elsewhere))
 
 
-def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray) -> Cause:
+def _missed_turn(track: Track, begin: float, end: float) -> float:
+    """Return by how much [rad] all headings after a stretch may be wrong that go on from the one that stood.
+
+    It is as much as the vehicle turns elsewhere in as long a time, in the root of the mean square.
+    """
+    if end >= track.times[-1]:
+        return 0.0
+    ends = track.times + end - begin
+    starts = track.times[(ends <= begin) | ((track.times >= end) & (ends <= track.times[-1]))]
+    turns = wrapped((track.at(starts + end - begin) - track.at(starts))[:, 2])
+    return float(np.sqrt((turns**2).mean())) if len(turns) else _ANY_TURN
+
+
+def _cause(begin: float, end: float, within: np.ndarray, elsewhere: np.ndarray, turn: float) -> Cause:
     nats = 0.0
     if len(within):
         noise = max(float(elsewhere.std()) / np.sqrt(len(within)), 1e-2)
         nats = 0.5 * (float(within.mean() - elsewhere.mean()) / noise) ** 2
     text = f"odometry frozen for {end - begin:.0f} s{' while the echoes move' if _moves(within, elsewhere) else ''},"
-    return Cause(text, _CERTAIN + nats, begin, metres=_SPEED * (end - begin))
+    return Cause(text, _CERTAIN + nats, begin, turn=turn, metres=_SPEED * (end - begin))
 
 
 def _pairs(scans: Sequence[Scan]) -> Tuple[np.ndarray, np.ndarray]:

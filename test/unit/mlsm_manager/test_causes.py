@@ -186,6 +186,23 @@ def test_pairs_of_scans_that_reach_into_a_frozen_stretch_do_not_tell_how_far_apa
     assert cause.text.startswith("odometry frozen for 60 s while the echoes move")
 
 
+@pytest.mark.parametrize(
+    ("moves_on", "begin", "end", "turn"),
+    [(0.1, 200.0, 260.0, 60.0), (0.0, 200.0, 260.0, 0.0), (0.1, 340.0, 400.0, 0.0)],
+)
+def test_headings_after_a_freeze_may_be_wrong_by_what_the_vehicle_turns_elsewhere_in_that_time(
+    moves_on, begin, end, turn
+):
+    """A vehicle that turns by 1 degree per second, or never, and stands from `begin` to `end`, or to its end."""
+    times = np.arange(0.0, 401.0)
+    since = times - np.clip(times - begin, 0.0, end - begin)
+    track = Track(times, np.column_stack([0.1 * since, 0.0 * since, np.radians(10.0 * moves_on * since)]))
+    apart = [5.0, 6.5] * round((end - begin) / 20.0)
+    scans = _of_walls([0.0, 1.0] * round(begin / 20.0) + apart + [0.0, 1.0] * round((400.0 - end) / 20.0), track)
+    (cause,) = standing_causes(scans, track, track.poses)
+    assert np.degrees(cause.turn) == pytest.approx(turn, abs=0.1)
+
+
 @pytest.mark.parametrize("fault", [lambda one: broken.mount_turned(one, 120.0), broken.mount_upside_down])
 def test_a_mount_that_is_put_right_has_no_cause_left(fault):
     recording = fault(WHOLE)
