@@ -46,7 +46,7 @@ from mlsm_manager.self_check.causes import (
     ranked,
 )
 from mlsm_manager.self_check.companions import without_companions
-from mlsm_manager.self_check.course import moves_are_turned
+from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.motion_findings import goes_on_with_other_ranges
@@ -59,7 +59,7 @@ from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.beams.steady_head import steadied
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
-_YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes with a compass alone does not show"
+_YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes does not show"
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
 _MOSTLY = 0.9  # share of the beams whose angles are mended: then those of the head are
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
@@ -273,7 +273,9 @@ def _assumed(odometry: OdometryFound, mended: Sequence[Cause], refined: Optional
         return odometry.assumed
     if mended:
         return Assumption("the mount is as the echoes tell it, to some degrees; correct tf and map again", 0.0)
-    if odometry.kind is OdometryKind.HOVERING and not (refined is not None and refined.motion.is_course_told):
+    course = NOT_TOLD if refined is None else refined.motion.course
+    # What a DVL tells of the sonar's yaw errs with its own, whose usual errors alone are stated.
+    if course.strafes or (odometry.kind is OdometryKind.HOVERING and not course.is_told):
         return Assumption(_YAW_AS_TOLD, 0.0)
     return NOTHING_ASSUMED
 

@@ -58,8 +58,8 @@ class MotionFindings:
 
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
-    nodes. mounts: rad, by how much the sonar may be turned where no course tells it.
-    is_course_told: whether the vehicle has a usual course, which shows how the sonar is turned.
+    nodes. course: how the sonar is turned by the vehicle's usual one. mounts: rad, by how much it may be where none
+    tells it.
     """
 
     run: Solution
@@ -67,8 +67,8 @@ class MotionFindings:
     track: Track
     causes: List[Cause] = field(default_factory=list)
     apart: List[np.ndarray] = field(default_factory=list)
+    course: CourseFound = NOT_TOLD
     mounts: float = 0.0
-    is_course_told: bool = False
 
     @property
     def is_alone(self) -> bool:
@@ -98,7 +98,7 @@ class MotionFindings:
         aside = rotated(gone, np.full(len(gone), turn)) - gone
         causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
-        return replace(self, causes=causes, apart=apart, mounts=mounts, is_course_told=course.is_told)
+        return replace(self, causes=causes, apart=apart, course=course, mounts=mounts)
 
     def _late(self, places: np.ndarray) -> np.ndarray:
         """Return how far nodes at `places` (n, 2) [m] lie beside where they are by the sonar's clock, (n, 2) m.
