@@ -104,10 +104,13 @@ def with_loops_closed(live: LiveSolver, batch: BatchResult) -> LoopClosure:
 def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     """Return the fit of a whole run that begins at its state, which stays as it is.
 
-    fixed_steps: unknowns whose steps are known to _FIXED_STEP; None where none are.
+    fixed_steps: unknowns whose steps it keeps to _FIXED_STEP; None where none. That they are so well known is not said.
     """
     problem = _Batch(run.with_state(run.state.copy()), fixed_steps=fixed_steps)
     steps, converged = problem.converge()
+    if fixed_steps is not None:
+        problem = _Batch(run.with_state(problem.state))
+        problem.solve()
     poses, of_run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
     likelihood = problem.log_likelihood()
@@ -188,6 +191,18 @@ class _Batch:
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
+        self.solve()
+        move = self._solution.step + _MOMENTUM * self._move
+        self.state.nodes += self._nodes_of(move)
+        self.state.run += move[self._layout.run_start :]
+        # The first step makes equal what is constant along a run and which the live path found anew at each node.
+        self._move = move if self._is_begun else np.zeros_like(move)
+        self._is_begun = True
+        moves = self._nodes_of(self._solution.step)[:, :2]
+        return float(np.sqrt((moves**2).sum(axis=1).mean()))
+
+    def solve(self) -> None:
+        """Find the next step, and how well all is known, at the state."""
         equations, parameters = self._expected(), self._parameters
         add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
         points, pairs = self.met()
@@ -197,14 +212,6 @@ class _Batch:
         newest = self._layout.node_start(self._layout.last)
         self._prior.add(equations, newest, self.state.nodes[-1], self._covariance)
         self._solution = solution_of(equations)
-        move = self._solution.step + _MOMENTUM * self._move
-        self.state.nodes += self._nodes_of(move)
-        self.state.run += move[self._layout.run_start :]
-        # The first step makes equal what is constant along a run and which the live path found anew at each node.
-        self._move = move if self._is_begun else np.zeros_like(move)
-        self._is_begun = True
-        moves = self._nodes_of(self._solution.step)[:, :2]
-        return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
     def log_likelihood(self, across: float = np.nan) -> float:
         """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""

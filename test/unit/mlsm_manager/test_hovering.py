@@ -23,7 +23,7 @@ from mlsm_manager.hovering.particle_filter import (
 )
 from mlsm_manager.hovering.particles import ACROSS, ALONG, AROUND, FARTHEST, Particles, drawn, led
 from mlsm_manager.hovering.path_agreement import MissedPosts, log_likelihood, shift_gains
-from mlsm_manager.joint_solver.batch_solver import fit_path
+from mlsm_manager.joint_solver.batch_solver import fit_of, fit_path
 from mlsm_manager.joint_solver.odometry_log import Motion, OdometryLog
 from mlsm_manager.joint_solver.velocity_models import AHEAD, ASIDE
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -328,12 +328,24 @@ def test_a_run_that_heard_nothing_stays_as_it_is():
     assert (best.log_likelihood, best.path is TRUE) == (0.0, True)
 
 
-def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal():
+@pytest.fixture(scope="module")
+def in_canal():
+    """A live solver in a canal, the unknowns on its true path, and the places of that (n, 2)."""
     made = tour(6, path=along_canal, corners=CANAL)
     profile = MlsmCoreParameters(estimator=EstimatorName.JOINT).changed(profile_values(OdometryKind.HEADING))
     live = followed(made.scans, profile.solver_parameters())
     motion = live.log.node_motion(np.arange(len(live.log.node_times)))
     true = made.truth.at(live.log.node_times)[:, :2]
-    start = replace(live.state, nodes=on_path(live.state.nodes, true, motion))
-    found = motion.poses[:, :2] + fit_path(live, start).nodes[:, :2]
+    return live, replace(live.state, nodes=on_path(live.state.nodes, true, motion)), true
+
+
+def test_a_fit_that_takes_steps_for_told_does_not_creep_along_a_canal(in_canal):
+    live, start, true = in_canal
+    found = live.solution.with_state(fit_path(live, start)).node_places(np.arange(len(true)))
     np.testing.assert_allclose(found - found[0], true - true[0], atol=0.3)
+
+
+def test_steps_that_a_fit_takes_for_told_make_nothing_known_along_a_canal(in_canal):
+    live, start, _ = in_canal
+    along = fit_of(live.solution.with_state(start), fixed_steps=start).pose_covariances[-1, 0, 0]
+    assert np.sqrt(along) > 2.0  # six steps of 0.3 m each are 0.7 m
