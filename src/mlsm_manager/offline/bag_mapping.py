@@ -196,7 +196,7 @@ def _followed(
     again = _replayed(recording, scans, changed)
     if again.solver is not None and strafes(replayed.solver, again.solver):
         return other, changed, again
-    return odometry, parameters, replayed
+    return odometry, parameters, replace(replayed, strafing=again.solver)
 
 
 def _positions_mislead(

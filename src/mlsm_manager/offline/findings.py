@@ -12,9 +12,10 @@ from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import RUN_COLUMNS
 from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed, ReplayParameters
-from mlsm_manager.offline.trust import Trust, radii
+from mlsm_manager.offline.trust import KnownPlaces, Trust, radii
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
@@ -123,21 +124,31 @@ class _BestPath(NamedTuple):
 
 
 def _live_path(replayed: Replayed) -> _BestPath:
-    solver = replayed.solver
-    times, places = (np.array(ones) for ones in zip(*((one.time, one.T_map_base[:2]) for one in solver.estimates)))
-    covariances = np.array([one.pose_covariance[:2, :2] for one in solver.estimates])
-    expected = solver.expected_deviations(solver.estimates)
-    return _BestPath(replayed.corrected, solver.solution, times, places, covariances, expected)
+    solver, strafing = replayed.solver, replayed.strafing
+    known, expected = _known_live(solver), solver.expected_deviations(solver.estimates)
+    known = known if strafing is None else known.or_on(_known_live(strafing))
+    return _BestPath(replayed.corrected, solver.solution, *known, expected)
 
 
-def _refined_path(refined: Refined, solver: LiveSolver) -> _BestPath:
-    times = refined.batch.node_times
-    places = refined.solution.node_places(np.arange(len(times)))
-    lengths = np.full(len(times), solver.estimates[-1].length_deviation)
+def _known_live(solver: LiveSolver) -> KnownPlaces:
+    told = ((one.time, one.T_map_base[:2], one.pose_covariance[:2, :2]) for one in solver.estimates)
+    return KnownPlaces(*(np.array(ones) for ones in zip(*told)))
+
+
+def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
+    solver, strafing = replayed.solver, replayed.strafing
+    known = _known_by(refined.batch, refined.solution)
+    lengths = np.full(len(known.times), solver.estimates[-1].length_deviation)
     directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
-    expected = expected_deviations(places - places[0], lengths, directions)
-    covariances = refined.batch.pose_covariances[:, :2, :2] + refined.motion.spread(times)
-    return _BestPath(refined.poses, refined.solution, times, places, covariances, expected, refined.motion.mounts)
+    expected = expected_deviations(known.places - known.places[0], lengths, directions)
+    known = known._replace(covariances=known.covariances + refined.motion.spread(known.times))
+    known = known if strafing is None else known.or_on(_known_by(fitted(strafing), strafing.solution))
+    return _BestPath(refined.poses, refined.solution, *known, expected, refined.motion.mounts)
+
+
+def _known_by(fit: BatchResult, run: Solution) -> KnownPlaces:
+    places = run.with_state(fit.state).node_places(np.arange(len(fit.node_times)))
+    return KnownPlaces(fit.node_times, places, fit.pose_covariances[:, :2, :2])
 
 
 def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> List[Verdict]:
@@ -222,7 +233,7 @@ class Findings:
         if refined is None:
             calibration, best, closing = Calibration.found(solver, solver.estimates[-1]), _live_path(replayed), None
         else:
-            calibration, best = Calibration.of_batch(solver, refined.batch), _refined_path(refined, solver)
+            calibration, best = Calibration.of_batch(solver, refined.batch), _refined_path(refined, replayed)
             closing = refined.closing
         verdicts = [*_checks(replayed, best, calibration), *further]
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)

@@ -133,7 +133,8 @@ class Replayed:
 
     times: (m,) s of the odometry. odometry, corrected: (m, 3) T_odom_base and T_map_base, the second as it was known
     at each moment. updates: of all scans that were taken, oldest first. refused: how many were not, by the reason.
-    seconds: of a core for each scan.
+    seconds: of a core for each scan. strafing: the run of a vehicle that strafes, which the scans may be as well; None
+    where they tell that it does not, or nobody asked.
     """
 
     times: np.ndarray
@@ -143,6 +144,7 @@ class Replayed:
     updates: List[ScanUpdate]
     refused: Mapping[str, int]
     seconds: List[float]
+    strafing: Optional[LiveSolver] = None
 
     @property
     def poses(self) -> Dict[str, np.ndarray]:

@@ -1,7 +1,7 @@
 """How far a run can be trusted: what contradicts, what was not measured, and how well the position is known."""
 
 from dataclasses import dataclass, replace
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -128,6 +128,26 @@ _NOTHING = "nothing can be said of the position"
 
 def _within(deviation: float) -> str:
     return f"within {WITHIN * deviation:.1f} m"
+
+
+class KnownPlaces(NamedTuple):
+    """Where a vehicle was by one run. times: (k,) s. places: (k, 2) m in map. covariances: (k, 2, 2) m^2."""
+
+    times: np.ndarray
+    places: np.ndarray
+    covariances: np.ndarray
+
+    def or_on(self, other: "KnownPlaces") -> "KnownPlaces":
+        """Return these places, as uncertain as where the vehicle may as well have gone the other way, if that is more.
+
+        other: at any times.
+        """
+        columns = np.column_stack([other.places, other.covariances.reshape(-1, 4)])
+        there = np.stack([np.interp(self.times, other.times, column) for column in columns.T], axis=-1)
+        apart, of_other = there[:, :2] - self.places, there[:, 2:].reshape(-1, 2, 2)
+        if_other = of_other + apart[:, :, np.newaxis] * apart[:, np.newaxis]
+        is_more = radii(if_other) > radii(self.covariances)
+        return self._replace(covariances=np.where(is_more[:, np.newaxis, np.newaxis], if_other, self.covariances))
 
 
 def radii(covariances: np.ndarray) -> np.ndarray:

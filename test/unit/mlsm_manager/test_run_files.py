@@ -17,7 +17,7 @@ from mlsm_manager.offline.charts import origin_of_fixes, satellite_fixes
 from mlsm_manager.offline.recording import Recording, Truth, scans_of
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, ReplayParameters, replay
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
-from mlsm_manager.offline.trust import Trust
+from mlsm_manager.offline.trust import KnownPlaces, Trust
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Assumption
 from mlsm_manager.self_check.verdict import Answer, Verdict
@@ -160,6 +160,15 @@ def test_nothing_is_said_of_the_position_by_an_assumption_where_no_check_had_eno
     trust = replace(trust_of(SHORT.assuming("it was turned")), assumed=Assumption("it was turned"), if_so=1.0)
     assert trust.line == "trust: NOT MEASURED: it was turned; nothing can be said of the position"
     assert trust.uncertainty is None
+
+
+@pytest.mark.parametrize(("deviation", "stated"), [(0.5, np.sqrt(1.0 + 4.0)), (3.0, 3.0)])
+def test_where_two_paths_are_possible_the_larger_deviation_from_the_one_that_is_shown_is_stated(deviation, stated):
+    times = np.array([0.0, 10.0])
+    shown = KnownPlaces(times, np.zeros((2, 2)), np.tile(0.5 * deviation**2 * np.eye(2), (2, 1, 1)))
+    other = KnownPlaces(times - 5.0, np.array([[0.0, 0.0], [4.0, 0.0]]), np.tile(0.5 * np.eye(2), (2, 1, 1)))
+    covariances = shown.or_on(other).covariances
+    assert np.sqrt(np.trace(covariances[0])) == pytest.approx(stated)
 
 
 def test_stretches_are_doubtful_where_a_check_fires():
