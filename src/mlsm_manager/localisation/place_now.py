@@ -78,8 +78,8 @@ def position_state(
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
     if place.fixes < FEWEST_CHECKED:
-        needed = f"fixes so far {place.fixes}, {FEWEST_CHECKED} needed to show what is wrong"
-        return PositionState.PROVISIONAL, f"position provisional, {place.deviation:.1f} m: {needed}"
+        so_far = f"matched so far {place.fixes}, faults show from {FEWEST_CHECKED} scans on"
+        return PositionState.PROVISIONAL, f"position provisional, {place.deviation:.1f} m: {so_far}"
     return PositionState.GOOD, f"position good, {place.deviation:.1f} m"
 
 

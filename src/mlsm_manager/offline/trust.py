@@ -71,12 +71,12 @@ class Trust:
     def _not_measured(self) -> str:
         reason = self.assumed.text or f"none of {len(self.verdicts)} checks had enough data"
         if self.matched < FEWEST_CHECKED:
-            few = f"{counted(self.matched, 'scan')} matched, {FEWEST_CHECKED} needed to show what is wrong"
+            few = f"{counted(self.matched, 'scan')} matched, faults show from {FEWEST_CHECKED} scans on"
             reason = f"{few}; {self.assumed.text}" if self.assumed.text else few
         if not self._is_told:
             return f"{reason}; {_NOTHING}"
         if not self.assumed.text:
-            return f"{reason}; {self._known} if nothing is"
+            return f"{reason}; {self._known} if there are none"
         deviation = float(self.deviations.max())
         otherwise = f", {_within(deviation)} if not" if deviation > self.if_so else ""
         return f"{reason}; {self._known} if so{otherwise}"

@@ -112,7 +112,7 @@ def test_a_summary_that_cannot_be_written_leaves_the_old_one(tmp_path):
 FINE = Verdict("depth", 0.5, 1.0, "m")
 FIRING = Verdict("width", 2.0, 1.0, "too wide (2 m)", doubtful=np.array([[3.0, 9.0]]))
 SHORT = Verdict("length", np.nan, 1.0, "m")
-_FEW = ", 7 needed to show what is wrong"
+_FEW = ", faults show from 7 scans on"
 
 
 def trust_of(*verdicts, times=(0.0, 10.0, 200.0), matched=7):
@@ -128,7 +128,7 @@ def trust_of(*verdicts, times=(0.0, 10.0, 200.0), matched=7):
         ((SHORT,), 7, "NOT MEASURED: none of 1 checks had enough data; nothing can be said of the position"),
         ((FINE,), 1, f"NOT MEASURED: 1 scan matched{_FEW}; nothing can be said of the position"),
         ((FINE,), 2, f"NOT MEASURED: 2 scans matched{_FEW}; nothing can be said of the position"),
-        ((FINE,), 6, f"NOT MEASURED: 6 scans matched{_FEW}; position within 8.7 m if nothing is"),
+        ((FINE,), 6, f"NOT MEASURED: 6 scans matched{_FEW}; position within 8.7 m if there are none"),
         ((FINE, SHORT, FIRING), 7, "DOUBTFUL: too wide (2 m); at best position within 8.7 m"),
         ((FIRING,), 0, "DOUBTFUL: too wide (2 m); at best position within 8.7 m"),
     ],
