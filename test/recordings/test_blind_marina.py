@@ -6,8 +6,8 @@ from itertools import islice
 import numpy as np
 import pytest
 from benchmarks.fault_makers import range_told
-from benchmarks.faults import source
-from benchmarks.harness import mapped_as
+from benchmarks.faults import ending
+from benchmarks.harness import compass_alone, mapped_as
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -22,11 +22,20 @@ _SCANS = 60
 
 
 @pytest.fixture(scope="module")
-def recorded(recording):
-    found = read_recording(recording("marina_whole_blind.bag"), Request())
+def whole(recording):
+    return read_recording(recording("marina_whole_blind.bag"), Request())
+
+
+@pytest.fixture(scope="module")
+def recorded(whole):
     parameters = ReplayParameters(odometry=OdometryKind.DVL)
-    scans = [scan for scan, _ in islice(scans_of(found, EchoExtractor(parameters.echoes())), _SCANS)]
-    return found, parameters, scans
+    scans = [scan for scan, _ in islice(scans_of(whole, EchoExtractor(parameters.echoes())), _SCANS)]
+    return whole, parameters, scans
+
+
+@pytest.fixture(scope="module")
+def canal(whole):
+    return ending(whole, 600.0)
 
 
 def path_of(recording, parameters, scans):
@@ -44,13 +53,11 @@ def test_points_moved_by_a_nanometre_move_the_path_by_less_than_a_hundredth_of_a
     assert 0.0 < np.abs(distance[:, :2]).max() < 1e-5
 
 
-def test_positions_are_believed_in_a_canal_though_scans_of_a_shorter_path_lie_on_each_other_more(recording):
-    recording("marina_whole_blind.bag")
-    short_at_first = range_told(source("canal", 600.0), at=0.0, share=0.4, seconds=300.0)
+def test_positions_are_believed_in_a_canal_though_scans_of_a_shorter_path_lie_on_each_other_more(canal):
+    short_at_first = range_told(canal, at=0.0, share=0.4, seconds=300.0)
     assert mapped_as(short_at_first, "--refine").odometry.kind is OdometryKind.AUTO
 
 
-def test_a_canal_shows_no_iron_beside_a_compass_alone_that_errs_as_usual(recording):
-    recording("marina_whole_blind.bag")
-    found = mapped_as(source("canal compass", 600.0), "--refine", "--odometry", "heading")
+def test_a_canal_shows_no_iron_beside_a_compass_alone_that_errs_as_usual(canal):
+    found = mapped_as(compass_alone(canal), "--refine", "--odometry", "heading")
     assert found.findings.trust.causes == []
