@@ -48,8 +48,8 @@ from mlsm_manager.self_check.causes import (
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
+from mlsm_manager.self_check.fault_trials import goes_on_with_other_ranges
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
-from mlsm_manager.self_check.motion_findings import goes_on_with_other_ranges
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.surface_map.map_file import StoredMap

@@ -16,7 +16,8 @@ from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.scan_matching.scan import MapCloud, Track
 from mlsm_manager.self_check.causes import Fault
-from mlsm_manager.self_check.motion_findings import MotionFindings, motion_findings
+from mlsm_manager.self_check.fault_trials import without_faults
+from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
@@ -73,7 +74,7 @@ def refine(
     best, solver = hypotheses.believed(fits), hypotheses.shown
     closing = with_loops_closed(solver, best)
     done()
-    motion = motion_findings(solver.solution.with_state(closing.batch.state), closing.batch, track, suspected)
+    motion = without_faults(solver.solution.with_state(closing.batch.state), closing.batch, track, suspected)
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in replayed.scans:

@@ -14,7 +14,8 @@ from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
-from mlsm_manager.self_check.motion_findings import MotionFindings, motion_findings
+from mlsm_manager.self_check.fault_trials import without_faults
+from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.standing import standing_causes
 from node_support.geometry import composed, move_of
 
@@ -100,5 +101,5 @@ class LiveCauses:
 def _motion_of(run: Solution, suspected: Sequence[Fault]) -> MotionFindings:
     """Return what speaks against odometry and sonar of a run, and what its course says of the mount."""
     track = run.log.odometry.track_from(-np.inf)
-    motion = motion_findings(run, fit_of(run), track, suspected)
+    motion = without_faults(run, fit_of(run), track, suspected)
     return motion.with_course(track.with_poses(motion.run.path(track.times)))

@@ -1,55 +1,23 @@
 """What the echoes of a whole run say against its odometry and its sonar, and the run with that mended."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
-from mlsm_manager.joint_solver.map_support import shares_heard_before
+from mlsm_manager.joint_solver.batch_solver import BatchResult
 from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
-from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_turned, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.sonar_trials import (
-    SonarFault,
-    SonarKind,
-    changed_ranges,
-    fit_without,
-    likeliest,
-    likelihood_across,
-    ranges_changed_at,
-)
-from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
+from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, is_same
+from mlsm_manager.self_check.causes import Cause, is_same
 from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, course_causes, course_of
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
-from mlsm_manager.self_check.map_checks import scans_go_on
-from mlsm_manager.self_check.verdict import Answer
 from node_support.geometry import move_of, rotated, transformed
 
-# A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
-# scale, and its mean. Beyond, faults are tried.
-_HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
-_NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
-_NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
-_NATS_CIRCLE = 20.0  # of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22
-_SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
-_LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
-_BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
-_SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
-_ROUNDS = 2
-_TURNED = np.radians(15.0)  # between turns that are tried of a vehicle whose compass stuck: scans then still meet
-_NATS_TURNED = 15.0  # by which one must be likelier than none: in a marina a wrong one of 24 was so by 4 nats
-_MORE = 1.05  # times as much: true distances add 3 % in a marina, and a path that is wrongly halved 17 to 33 %
-_EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
-_GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
-_FAULTS = 3  # at most, one after the other
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
-_FEWEST = 15  # nodes: fewer do not tell a change from noise
 
 
 @dataclass(frozen=True)
@@ -75,6 +43,16 @@ class MotionFindings:
         """Whether a compass tells the motion alone."""
         return bool(np.isinf(self.run.parameters.odometry.distance_deviation))
 
+    @property
+    def is_told(self) -> bool:
+        """Whether the odometry says anything of the motion."""
+        return bool(np.ptp(self.track.poses, axis=0).any())
+
+    @property
+    def places(self) -> np.ndarray:
+        """(n, 2) m in map, of the nodes."""
+        return self.run.node_places(np.arange(len(self.run.state.nodes)))
+
     def spread(self, times: np.ndarray) -> np.ndarray:
         """Return what these paths add to the covariances of the position at `times` (k,) [s], (k, 2, 2) m^2."""
         added = np.zeros((len(times), 2, 2))
@@ -85,10 +63,10 @@ class MotionFindings:
 
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount."""
-        if not _tells(self.track):
+        if not self.is_told:
             return self
         # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
-        course, places = course_of(path, np.pi if self.is_alone else LARGEST), _places(self.run)
+        course, places = course_of(path, np.pi if self.is_alone else LARGEST), self.places
         # Where no course tells which of them is turned, it may be the sonar alone.
         direction = NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
@@ -157,189 +135,3 @@ class MotionFindings:
             return scan
         moves = move_of(reported.at(scan.times), self.track.at(scan.times))
         return replace(scan, points=transformed(moves, scan.points), track=self.track)
-
-
-class _Trial(NamedTuple):
-    """gain: of log likelihood, over the run as it was found before, and over what a turn needs that nobody reported."""
-
-    fault: Fault
-    run: Solution
-    fit: BatchResult
-    track: Track
-    gain: float
-
-
-def motion_findings(
-    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[Fault] = ()
-) -> MotionFindings:  # fmt: skip
-    """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
-
-    Each fault is taken out and the run fitted again; the one with which echoes agree best is named. What a fit finds
-    besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of scans and beams
-    show.
-    """
-    found = MotionFindings(run, fit, track)
-    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not _tells(track):
-        return found
-    first = places = _places(run)
-    suspected = [one for fault in suspected if not _is_missed_turn(fault, suspected) for one in _possible(fault)]
-    for _ in range(_FAULTS + 1):
-        errors = freed_errors(found.run)
-        if errors is None:
-            return found
-        places = errors.places
-        faults = [*_likely(errors), *suspected, *_of_sonar(found)]
-        if len(found.causes) == _FAULTS or not faults:
-            break
-        best = _best(found, faults)
-        if best.gain < _needed(found, best.fault) or not best.fault.is_beyond(errors.times[-1]):
-            break
-        found = _without(found, best)
-        suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
-    others = [places, first] if found.causes else [places] if _errs(errors) else []
-    return replace(found, apart=[other - _places(found.run) for other in others])
-
-
-def _needed(found: MotionFindings, fault: Fault) -> float:
-    """Return by how many nats a run must be likelier without a fault for that to be named.
-
-    Distances may change at any moment: where half of the circle was heard, a wrong change gained 6.4.
-    """
-    if found.is_alone and fault.kind is FaultKind.CIRCLE:
-        return _NATS_CIRCLE
-    if found.is_alone and fault.kind in _SUDDEN:
-        return _NATS_ALONE
-    return NAMED_FROM if fault.kind is FaultKind.DISTANCES else _NATS
-
-
-def _tells(track: Track) -> bool:
-    return bool(np.ptp(track.poses, axis=0).any())
-
-
-def _places(run: Solution) -> np.ndarray:
-    return run.node_places(np.arange(len(run.state.nodes)))
-
-
-def _errs(errors: OdometryErrors) -> bool:
-    scales = np.log1p(np.maximum(errors.scales, -0.9))
-    return bool(errors.headings.std() > _HEADING or scales.std() > _SCALE or abs(scales.mean()) > _LENGTH)
-
-
-def _likely(errors: OdometryErrors) -> List[Fault]:
-    """Return faults that explain what a fit corrects which lets the odometry err; ranges may have changed instead."""
-    if not _errs(errors):
-        return []
-    found = likely_faults(errors.times, errors.yaws, errors.headings, errors.scales)
-    if not errors.scales.any():
-        return [fault for fault in found if fault.kind not in OF_DISTANCES]
-    changed = next(one for one in found if one.kind is FaultKind.DISTANCES)
-    number = int(np.searchsorted(errors.times, changed.begin))
-    begins = errors.times[max(number - _EARLIER, 1) : number + _LATER]
-    return [*found, *ranges_changed_at(begins.tolist(), -changed.sizes[0])]
-
-
-def _of_sonar(found: MotionFindings) -> List[SonarFault]:
-    """Return faults of the sonar that make the run likelier, and are more than mounts usually err.
-
-    With a compass alone no distance tells a change of ranges: what is heard before and after it must.
-    """
-    faults = [fault for fault in likeliest(found.run, found.fit) if fault.is_beyond(found.fit.node_times[-1])]
-    return faults + ([trial.fault for trial in _other_ranges(found)] if found.is_alone else [])
-
-
-def _other_ranges(found: MotionFindings) -> List[_Trial]:
-    """Return the trials of changes of ranges that make the run likelier."""
-    tried = (_tried(found, fault) for fault in changed_ranges(found.run))
-    return [trial for trial in tried if trial.gain > 0.0]
-
-
-def goes_on_with_other_ranges(run: Solution, track: Track) -> bool:
-    """Return whether scans of a run of a vehicle that goes ahead go on once a change of its ranges is taken out.
-
-    False where scans are too few to tell.
-    """
-    fit = fit_of(run)
-    trials = _other_ranges(MotionFindings(replace(run, state=fit.state), fit, track))
-    best = max(trials, key=_gain, default=None)
-    if best is None or best.gain < _NATS_ALONE:
-        return False
-    shares = shares_heard_before(replace(best.run, state=best.fit.state), 0)
-    return scans_go_on(run.log.node_times[1:], shares, _GO_ON).answer is Answer.FINE
-
-
-def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:
-    best = max((_tried(found, fault) for fault in faults), key=_gain)
-    for _ in range(_ROUNDS if isinstance(best.fault, SonarFault) else 1):
-        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_gain)
-    return best
-
-
-def _possible(fault: Fault) -> List[Fault]:
-    """Return what a suspected fault may be: nobody tells how far a vehicle turned while its compass stuck."""
-    if fault.kind is not FaultKind.STUCK:
-        return [fault]
-    return [replace(fault, sizes=(turn,)) for turn in (_TURNED * np.arange(-12, 12)).tolist()]
-
-
-def _is_missed_turn(fault: Fault, suspected: Sequence[Fault]) -> bool:
-    """Return whether a slip is suspected of the head while the compass stuck: the vehicle turned."""
-    stuck = [one for one in suspected if one.kind is FaultKind.STUCK]
-    return fault.kind is FaultKind.SLIP and any(one.begin <= fault.begin <= one.end for one in stuck)
-
-
-def _beside(fault: Fault) -> List[Fault]:
-    if fault.kind is FaultKind.STUCK:
-        return [replace(fault, sizes=(fault.sizes[0] + turn,)) for turn in (-_TURNED / 3.0, _TURNED / 3.0)]
-    if not isinstance(fault, SonarFault):
-        return [fault.times(factor) for factor in _LARGER]
-    others = [fault.times(factor) for factor in _BESIDE]
-    if fault.kind is SonarKind.RANGES:
-        others += [replace(fault, begin=fault.begin + seconds) for seconds in _SECONDS]
-    return [other for other in others if other.is_possible]
-
-
-def _tried(found: MotionFindings, fault: Fault) -> _Trial:
-    if isinstance(fault, SonarFault):
-        run, fit = fit_without(found.run, fault)
-        return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
-    track, run = fault.mended(found.track), found.run
-    if fault.kind is FaultKind.STUCK:  # how the vehicle turned meanwhile the echoes tell
-        model = run.parameters.odometry.stuck(fault.begin, fault.end)
-        run = replace(run, parameters=replace(run.parameters, odometry=model))
-    span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
-    turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)
-    fit = fit_turned(run, track) if turns else fit_with(run, track, span)
-    run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
-    needed = _NATS_TURNED if fault.kind is FaultKind.STUCK and fault.sizes[0] else 0.0
-    needed += _of_more(found, run, fit, fault.begin) if fault.kind in OF_DISTANCES else 0.0
-    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood - needed)
-
-
-def _of_more(found: MotionFindings, run: Solution, fit: BatchResult, begin: float) -> float:
-    """Return by how much a fit is likelier because more is compared from `begin` [s] on than before: on a path that is
-    too short, scans that end where the sonar hears no farther lie on each other.
-    """
-    before, _ = compared_since(replace(found.run, state=found.fit.state), begin)
-    compared, likelihood = compared_since(replace(run, state=fit.state), begin)
-    return max(compared - _MORE * before, 0.0) * likelihood / max(compared, 1.0)
-
-
-def _gained(found: MotionFindings, fault: SonarFault, run: Solution, fit: BatchResult) -> float:
-    if np.isnan(fault.begin):
-        return fit.log_likelihood - found.fit.log_likelihood
-    unchanged = replace(fault, sizes=(0.0,))
-    return likelihood_across(run, fit, fault) - likelihood_across(found.run, found.fit, unchanged)
-
-
-def _gain(trial: _Trial) -> float:
-    return trial.gain
-
-
-def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:
-    run, fault = replace(trial.run, state=trial.fit.state), trial.fault
-    # With a compass alone it may as well be the ranges before it that are wrong, and with them the size of all.
-    is_size = found.is_alone and isinstance(fault, SonarFault) and fault.kind is SonarKind.RANGES
-    length = float(np.abs(np.expm1(-fault.sizes[0])) / np.sqrt(2.0)) if is_size else 0.0
-    certain = CERTAIN if fault.kind is FaultKind.STUCK else 0.0  # that it did its headings tell
-    cause = Cause(fault.text, certain + trial.gain, fault.begin, length=length, fault=fault)
-    return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])
