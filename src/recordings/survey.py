@@ -87,26 +87,18 @@ def _survey_of_bag(path: Path, bag: Bag, request: Request) -> Survey:
 def _assumed(motion: Optional[Motion], recorded: RecordedBeams, request: Request, missing: List[str]) -> List[str]:
     """Return what is assumed of motion and beams, and add to what is missing."""
     assumed = [*(motion.notes if motion is not None else []), *recorded.notes]
-    if motion is not None and recorded.beams:
-        _look_at_place(motion, recorded, request, assumed, missing)
-    return assumed
-
-
-def _look_at_place(
-    motion: Motion, first: RecordedBeams, request: Request, assumed: List[str], missing: List[str]
-) -> None:
-    tree, notes = mounted(motion.tree, request.motion.base_frame, first, request.parameters)
+    if motion is None or not recorded.beams:
+        return assumed
+    tree, notes = mounted(motion.tree, request.motion.base_frame, recorded, request.parameters)
     assumed += notes
-    beam, names = first.beams[0], request.motion
+    beam, names = recorded.beams[0], request.motion
     link = tree.tracks.get((names.odom_frame, names.base_frame))
     if link is not None and not link.covers(np.array([beam.stamp_ns])).any():
         reason = tree.why_not(names.odom_frame, beam.frame_id, np.array([beam.stamp_ns]))
         assumed.append(f"the first beams are left out: {reason}")
-    missing += (
-        []
-        if tree.links_between(names.odom_frame, beam.frame_id) is not None
-        else [f"no transforms link {beam.frame_id} and {names.odom_frame}"]
-    )
+    if tree.links_between(names.odom_frame, beam.frame_id) is None:
+        missing.append(f"no transforms link {beam.frame_id} and {names.odom_frame}")
+    return assumed
 
 
 def _signs_of_z_down(bag: Bag, frames: List[str]) -> List[str]:

@@ -14,12 +14,12 @@ from underwater_map_construction.msg import SonarScanLine
 
 
 def run_driver() -> None:
-    model = SonarModel("imagenex_852_driver", DriverParameters, SonarDevice, _ping_message)
+    model = SonarModel("imagenex_852_driver", DriverParameters, SonarDevice, _message)
     run(model.name, lambda: DriverNode(model))
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
-    model = HeadModel("imagenex_852_emulator", EmulatorParameters, _head, _line)
+    model = HeadModel("imagenex_852_emulator", EmulatorParameters, _head, lambda parameters: PtyLine(parameters.link))
     run(model.name, lambda: EmulatorNode(model, world_echoes))
 
 
@@ -28,13 +28,9 @@ def reply_message(reply: Reply, gain_db: int, inverted: bool) -> Optional[SonarS
     return scan_line(head_angle(reply.head_position, inverted), reply.echoes, reply.range_resolution, gain_db)
 
 
-def _ping_message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:
+def _message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:
     return reply_message(ping.reply, ping.command.start_gain_db, parameters.inverted)
 
 
 def _head(parameters: EmulatorParameters, source: EchoSource, faults: FaultInjector) -> Emulated852:
     return Emulated852(source, faults, parameters.timing(), parameters.head_id)
-
-
-def _line(parameters: EmulatorParameters) -> PtyLine:
-    return PtyLine(parameters.link)

@@ -34,11 +34,10 @@ _PARTS = 4  # of the recording, whose own offsets tell the deviation
 
 
 class ClockOffset(NamedTuple):
-    """seconds: to be added to the stamps of the beams. deviation: s. clearness: deviations above other offsets."""
+    """seconds: to be added to the stamps of the beams. deviation: s."""
 
     seconds: float
     deviation: float
-    clearness: float
 
 
 class _Echoes(NamedTuple):
@@ -85,7 +84,7 @@ def clock_offset(
             f"deviations above others, {_CLEAR:g} are needed; give --offset SECONDS"
         )
     seconds = _finest(echoes, way, best)
-    return ClockOffset(seconds, _deviation(echoes, way, seconds), clearness)
+    return ClockOffset(seconds, _deviation(echoes, way, seconds))
 
 
 def _clearness(scores: np.ndarray) -> float:

@@ -55,8 +55,8 @@ class SonarModel:
 class DriverNode:
     """Keeps the head pinging, and publishes every valid reply once, in order."""
 
-    def __init__(self, model: SonarModel, namespace: str = "~") -> None:
-        """Raises ParameterError for a bad parameter in `namespace` and StartError for an unusable port."""
+    def __init__(self, model: SonarModel) -> None:
+        """Raises ParameterError for a bad parameter and StartError for an unusable port."""
         self._model = model
         self._device: Optional[LineDevice] = None
         self._scanner: Optional[Scanner] = None
@@ -64,7 +64,7 @@ class DriverNode:
         self._last_stats = LineStats()
         self.health = DriverHealth(model.name, lambda line: rospy.logwarn("%s", line), self._stats)
         self.healths = [self.health]
-        self._live = ReconfigurableParameters(model.parameters, namespace, self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(model.parameters, "~", self.health, self._use_parameters)
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
         self._connect()

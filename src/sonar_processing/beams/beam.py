@@ -137,14 +137,6 @@ def bin_points(origins: np.ndarray, directions: np.ndarray, ranges: np.ndarray, 
     return points
 
 
-def kept_bins(ranges: np.ndarray, heights: np.ndarray, min_range: float, height_limit: float) -> np.ndarray:
-    """Return bool of the shape of `heights` [m]: the bins that are neither too near nor too high.
-
-    ranges [m] must broadcast to `heights`, which are in the target frame.
-    """
-    return (ranges >= min_range) & (heights <= height_limit)
-
-
 def _offsets(count: int, beam_width: float) -> np.ndarray:
     if count == 1:
         return np.zeros(1)

@@ -9,15 +9,7 @@ from typing import Deque, Iterator, List, Optional, Sequence
 import numpy as np
 
 from node_support.errors import RefusedInput
-from sonar_processing.beams.beam import (
-    Beam,
-    PlacedBeam,
-    has_other_bins,
-    kept_bins,
-    long_after,
-    project_beams,
-    servo_moved,
-)
+from sonar_processing.beams.beam import Beam, PlacedBeam, has_other_bins, long_after, project_beams, servo_moved
 from sonar_processing.beams.head import HeadTurn
 from sonar_processing.cloud import Cloud
 from sonar_processing.scans.parameters import SonarToCloudParameters
@@ -99,7 +91,7 @@ class ScanAssembler:
         sides = 1 if parameters.mode.is_laser else parameters.dispersed_points
         poses = np.stack([one.T_target_sonar for one in placed])
         points = project_beams([one.beam for one in placed], poses, sides, parameters.beam_width)
-        keep = kept_bins(np.tile(ranges, sides), points[..., 2], parameters.min_range, parameters.height_limit)
+        keep = (np.tile(ranges, sides) >= parameters.min_range) & (points[..., 2] <= parameters.height_limit)
         if parameters.mode.is_laser:
             bins, found = picked_bins(points[..., 3], keep, parameters)
             points, keep = points[np.arange(len(placed)), bins][:, np.newaxis], found[:, np.newaxis]

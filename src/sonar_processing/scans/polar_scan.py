@@ -7,7 +7,7 @@ from typing import List, Tuple
 import numpy as np
 
 from node_support.geometry import FULL_TURN, wrapped
-from sonar_processing.beams.beam import PlacedBeam, beam_directions, bin_points, kept_bins
+from sonar_processing.beams.beam import PlacedBeam, beam_directions, bin_points
 from sonar_processing.cloud import Cloud
 from sonar_processing.scans.parameters import LaserPick, SonarToCloudParameters
 
@@ -66,7 +66,7 @@ class PolarScan:
     def kept(self, parameters: SonarToCloudParameters) -> np.ndarray:
         """Return (beams, bins) bool: which bins neither `min_range` nor `height_limit` removes."""
         heights = self.origins[:, 2:] + self.directions[:, 2:] * self.ranges
-        return kept_bins(self.ranges, heights, parameters.min_range, parameters.height_limit)
+        return (self.ranges >= parameters.min_range) & (heights <= parameters.height_limit)
 
     def from_newest(self, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
         """Return (n, 3) m: the bins `bins` (n,) of `beams` (n,), seen from the sonar's pose at its newest beam."""
