@@ -4,23 +4,13 @@ import html
 from collections import Counter
 from enum import Enum
 from pathlib import Path
+from string import Template
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
 from mlsm_manager.self_check.verdict import FEWEST_CHECKED, Answer
 from node_support.errors import counted
-
-_PAGE = """<!DOCTYPE html>
-<html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width, initial-scale=1">
-<link rel="icon" href="data:,"><title>{title}</title><style>
-body {{ font-family: system-ui, sans-serif; margin: 1.5em auto; max-width: 1200px; padding: 0 1em; color: #222; }}
-h1 {{ font-size: 1.5em; }} table {{ border-collapse: collapse; width: 100%; }}
-td {{ border-top: 1px solid #ddd; padding: 0.7em 1em 0.7em 0; vertical-align: top; overflow-wrap: anywhere; }}
-img {{ width: 260px; height: 200px; object-fit: contain; display: block; }}
-b {{ display: inline-block; padding: 0.1em 0.6em; border-radius: 0.8em; color: white; }}
-small {{ color: #666; }} p {{ margin: 0.3em 0; }}
-</style></head><body><h1>{title}</h1><p>{counts}</p><table>{rows}</table></body></html>
-"""
+from node_support.files import package_folder
 
 
 class Standing(Enum):
@@ -72,7 +62,8 @@ def index_page(outcomes: Sequence[Outcome], total: int) -> str:
     counts = " &nbsp; ".join(f"{found[one]} {one.badge}" for one in Standing if found[one])
     title = f"{sum(bool(one.summary) for one in outcomes)} of {total} recordings mapped"
     waiting = f" &nbsp; {total - len(outcomes)} waiting" if len(outcomes) < total else ""
-    return _PAGE.format(title=title, counts=counts + waiting, rows="".join(map(_row, outcomes)))
+    page = Template((package_folder() / "web/templates/index.html").read_text(encoding="utf-8"))
+    return page.substitute(title=title, counts=counts + waiting, rows="".join(map(_row, outcomes)))
 
 
 def _row(outcome: Outcome) -> str:
