@@ -82,7 +82,7 @@ $("whole").onclick = () => { map.touched = true; map.whole(); };
 $("nearer").onclick = () => map.zoom(1.4);
 $("farther").onclick = () => map.zoom(1 / 1.4);
 $("overlay").onclick = () => { map.overlay = !map.overlay; map.isDirty = true; press("overlay", map.overlay); };
-$("up").onclick = () => { sonar.bowUp = !sonar.bowUp; sonar.isDirty = true; $("up").textContent = sonar.bowUp ? "bow up" : "north up"; };
+$("up").onclick = () => { sonar.bowUp = !sonar.bowUp; sonar.repaint(); $("up").textContent = sonar.bowUp ? "bow up" : "north up"; };
 $("marking").onclick = () => startMarking($("marking").getAttribute("aria-pressed") !== "true");
 $("cancel").onclick = () => startMarking(false);
 $("time").oninput = () => setTime(Number($("time").value) >= Number($("time").max) ? null : Number($("time").value));

@@ -11,7 +11,7 @@ export class SonarView {
     this.beams = new Map();  // by their direction from the bow
     this.tables = { fromBow: new Uint8Array(SLOTS * BINS), inMap: new Uint8Array(SLOTS * BINS) };
     this.lookup = pixels();
-    this.pictures = { fromBow: blank(), inMap: blank() };
+    this.picture = blank();
     new ResizeObserver(() => { this.isDirty = true; }).observe(canvas);
   }
 
@@ -50,16 +50,14 @@ export class SonarView {
 
   get north() { return this.model.hello.azimuth * Math.PI / 180; }  // in the map, counter-clockwise from x
 
-  // Paint the tables: up is the bow, or north.
-  paint() {
-    for (const [name, picture] of Object.entries(this.pictures)) {
-      const { context, image } = picture, words = new Uint32Array(image.data.buffer), { slot, bin } = this.lookup;
-      const offset = name === "inMap" ? Math.round(this.north / (2 * Math.PI) * SLOTS) : 0, table = this.tables[name];
-      for (let i = 0; i < words.length; i += 1) {
-        words[i] = bin[i] < BINS ? this.colors.sonar[table[((slot[i] + offset) & (SLOTS - 1)) * BINS + bin[i]]] : 0;
-      }
-      context.putImageData(image, 0, 0);
+  // Paint the table that is shown: up is the bow, or north.
+  paint(name) {
+    const { context, image } = this.picture, words = new Uint32Array(image.data.buffer), { slot, bin } = this.lookup;
+    const offset = name === "inMap" ? Math.round(this.north / (2 * Math.PI) * SLOTS) : 0, table = this.tables[name];
+    for (let i = 0; i < words.length; i += 1) {
+      words[i] = bin[i] < BINS ? this.colors.sonar[table[((slot[i] + offset) & (SLOTS - 1)) * BINS + bin[i]]] : 0;
     }
+    context.putImageData(image, 0, 0);
     this.stale = false;
   }
 
@@ -88,8 +86,8 @@ export class SonarView {
     const { canvas, context, colors } = this, ratio = window.devicePixelRatio || 1, side = canvas.clientWidth;
     if (!side) return;
     if (canvas.width !== Math.round(side * ratio)) canvas.width = canvas.height = Math.round(side * ratio);
-    if (this.stale) this.paint();
     const name = this.bowUp ? "fromBow" : "inMap", radius = side / 2 - 16, middle = side / 2;
+    if (this.stale) this.paint(name);
     context.setTransform(ratio, 0, 0, ratio, 0, 0);
     context.clearRect(0, 0, side, side);
     context.fillStyle = colors.water;
@@ -97,7 +95,7 @@ export class SonarView {
     context.arc(middle, middle, radius, 0, 2 * Math.PI);
     context.fill();
     context.imageSmoothingQuality = "high";
-    context.drawImage(this.pictures[name].canvas, middle - radius, middle - radius, 2 * radius, 2 * radius);
+    context.drawImage(this.picture.canvas, middle - radius, middle - radius, 2 * radius, 2 * radius);
     this.drawRings(middle, radius);
     if (this.sweep) {
       const angle = this.sweep[name] - (this.bowUp ? 0 : this.north);
