@@ -95,7 +95,7 @@ def main() -> None:
         for fault, (_, make) in faults(recording.seconds, arguments.seed).items():
             if re.search(arguments.rows, f"{name}: {fault}"):
                 broken = told_by(make(recording), parameters)
-                begin = whole[0].time + _begin(make)
+                begin = recording.track.times[0] + _begin(make)
                 print(f"{name + ': ' + fault:55} {line(broken, whole, begin)}", flush=True)
 
 

@@ -68,7 +68,7 @@ NEARBY = MatcherLimits()
 # fewer of the map's blocks need be heard of each: in the harbour half of them are not.
 EVERYWHERE = MatcherLimits(
     search_distance=500.0, search_angle=np.pi, search_cell=1.0, candidates=80, min_gain_over_second=6.0,
-    min_explained=0.9, min_agreement=0.6, same_place=3.0,
+    min_explained=0.93, min_agreement=0.6, same_place=3.0,
 )  # fmt: skip
 
 
