@@ -59,7 +59,7 @@ from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.beams.steady_head import steadied
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
-_YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes does not show"
+_YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes with a compass alone does not show"
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
 _MOSTLY = 0.9  # share of the beams whose angles are mended: then those of the head are
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
@@ -274,8 +274,7 @@ def _assumed(odometry: OdometryFound, mended: Sequence[Cause], refined: Optional
     if mended:
         return Assumption("the mount is as the echoes tell it, to some degrees; correct tf and map again", 0.0)
     course = NOT_TOLD if refined is None else refined.motion.course
-    # What a DVL tells of the sonar's yaw errs with its own, whose usual errors alone are stated.
-    if course.strafes or (odometry.kind is OdometryKind.HOVERING and not course.is_told):
+    if odometry.kind is OdometryKind.HOVERING and not course.is_told:
         return Assumption(_YAW_AS_TOLD, 0.0)
     return NOTHING_ASSUMED
 

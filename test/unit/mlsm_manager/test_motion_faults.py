@@ -178,8 +178,8 @@ def test_what_a_turned_dvl_hides_of_a_turned_sonar_is_stated():
     strafing = source("turning", 600.0)  # its DVL is turned by 10 degrees
     whole, turned = (mapped_as(one, "--refine") for one in (strafing, broken.mount_turned(strafing, 14.0)))
     assert outcome(turned, whole, named="").covered == 1.0
-    said = "trust: NOT MEASURED: the sonar's yaw in tf is right, which a vehicle that strafes does not show"
-    assert turned.findings.trust.line.startswith(said)
+    assert "NOT MEASURED" in turned.findings.trust.line
+    assert "direction of the sonar" in turned.findings.trust.line
 
 
 @pytest.mark.parametrize(("turn", "named"), [(0.0, 0), (3.0, 0), (-12.0, 1), (90.0, 1), (-179.0, 1)])
