@@ -256,7 +256,8 @@ class Following:
             belief = carried_on(belief, self._believed[1], pose, time, errors)
         covariance = belief.covariance[POSE, POSE].copy()
         covariance[POSITION, POSITION] += self.found.covariance(self._wrong)
-        return PlaceNow(time, time - self._fixed_at, self._intervals.overdue(time), covariance, self._fixes)
+        overdue = self._intervals.overdue(time)
+        return PlaceNow(time, time - self._fixed_at, overdue, covariance, self._fixes, self.found.by_mounts)
 
     @property
     def last_fix(self) -> np.ndarray:

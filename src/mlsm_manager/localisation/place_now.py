@@ -26,7 +26,8 @@ class PositionState(IntEnum):
 class PlaceNow(NamedTuple):
     """time: s, of what is told. age: s since the end of the scan of the newest fix. overdue: s since two more should
     have come. covariance: (3, 3) of the pose, propagated to now by the odometry's errors, with what causes add to it.
-    fixes: how many there were.
+    fixes: how many there were. by_mounts: m, of the deviation, by the sonar's yaw where nothing tells it: it turns map
+    and place alike, so that the place in the map is known.
     """
 
     time: float
@@ -34,11 +35,17 @@ class PlaceNow(NamedTuple):
     overdue: float
     covariance: np.ndarray
     fixes: int
+    by_mounts: float = 0.0
 
     @property
     def deviation(self) -> float:
         """Root of both variances' sum, m."""
         return float(np.sqrt(max(np.trace(self.covariance[POSITION, POSITION]), 0.0)))
+
+    @property
+    def is_unknown(self) -> bool:
+        """Whether the place in the map is known too badly to be told."""
+        return bool(self.deviation**2 - self.by_mounts**2 > LARGEST_DEVIATION**2)
 
 
 def doubts_of(
@@ -71,7 +78,7 @@ def position_state(
         return PositionState.UNKNOWN, "position lost: it is searched for in the whole map"
     if place is None:
         return PositionState.UNKNOWN, "; ".join(["no position yet", *doubts[:1]])
-    if place.deviation > LARGEST_DEVIATION:
+    if place.is_unknown:
         return PositionState.UNKNOWN, "; ".join([f"position not known, {place.deviation:.1f} m", *doubts[:1]])
     if doubts:
         return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
@@ -98,6 +105,6 @@ def report_place(health: Health, place: PlaceNow) -> None:
     if place.overdue > 0.0:
         detail = f"the newest is {place.age:.0f} s old; does the sonar's head turn, and are echoes heard?"
         health.problem("seconds without a new fix", f"{detail} The position is known to {place.deviation:.1f} m")
-    if place.deviation > LARGEST_DEVIATION and place.fixes >= FEWEST_MATCHED:
+    if place.is_unknown and place.fixes >= FEWEST_MATCHED:
         detail = f"its deviation is {place.deviation:.1f} m, must be at most {LARGEST_DEVIATION:g} m"
         health.problem("seconds in which the position is not known", detail, level=Level.ERROR)

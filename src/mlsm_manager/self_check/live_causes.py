@@ -39,7 +39,7 @@ class LiveCauses:
             self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
             self._is_new = False
             self._found: List[Cause] = []
-            self._spread = np.zeros((2, 2))
+            self._spread, self.by_mounts = np.zeros((2, 2)), 0.0
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
@@ -62,26 +62,27 @@ class LiveCauses:
         track = joined([scan.track for scan in scans])
         of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
         path = composed(corrections.at(track.times), track.poses)
-        of_beams, spread = standing_causes(scans, track, path), np.zeros((2, 2))
+        of_beams, spread, by_mounts = standing_causes(scans, track, path), np.zeros((2, 2)), 0.0
         found = [*of_echoes, *of_beams]
         run = newest_run()
         if run is not None:
             # What a stuck compass missed is not tried: the path is not mended live.
             shown = [cause.fault for cause in found if cause.fault is not None]
             motion = _motion_of(run, [*suspected, *(fault for fault in shown if fault.kind is not FaultKind.STUCK)])
-            found, spread = motion.told_with(of_echoes, of_beams), motion.spread(run.log.node_times[-1:])[0]
+            found, by_mounts = motion.told_with(of_echoes, of_beams), motion.by_mounts
+            spread = motion.spread(run.log.node_times[-1:])[0]
         found += [of_stuck(*one) for one in stuck_headings(track)]
         with self._lock:
             if self._places is places:
-                self._learn(found, spread, scans[0].start)
+                self._learn(found, spread, by_mounts, scans[0].start)
 
-    def _learn(self, found: List[Cause], spread: np.ndarray, begin: float) -> None:
+    def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
         """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after."""
         kinds = {cause.fault.kind for cause in found if cause.fault is not None}
         past = [cause for cause in self._found if cause.begin < begin and cause.fault is not None]
         self._found = [*found, *(cause for cause in past if cause.fault.kind not in kinds)]
         if not self._found or np.trace(spread) > np.trace(self._spread):
-            self._spread = spread
+            self._spread, self.by_mounts = spread, by_mounts
 
     def causes(self, steps: Sequence[Step]) -> List[Cause]:
         """Return what is wrong, ranked; steps: of the odometry, which were left out."""

@@ -61,6 +61,11 @@ class MotionFindings:
             added += np.einsum("na,nb->nab", beside, beside)
         return added
 
+    @property
+    def by_mounts(self) -> float:
+        """How far [m] the newest place may be turned about the run's first one by what nothing tells of the mounts."""
+        return float(self.mounts * np.hypot(*(self.places[-1] - self.places[0])))
+
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount."""
         if not self.is_told:

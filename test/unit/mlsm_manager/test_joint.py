@@ -253,6 +253,12 @@ def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lo
     assert position_state(None, is_lost, is_provisional, doubts)[0] is PositionState.UNKNOWN
 
 
+@pytest.mark.parametrize(("by_mounts", "state"), [(5.0, PositionState.GOOD), (2.0, PositionState.UNKNOWN)])
+def test_a_place_in_the_map_is_known_where_nothing_but_the_yaw_of_the_sonar_is_not(by_mounts, state):
+    place = PlaceNow(100.0, 10.0, 0.0, 18.0 * np.eye(3), 7, by_mounts)
+    assert position_state(place, False, False, [])[0] is state
+
+
 JUMP = Cause("odometry jumped by 30.0 m", 1e3, 88.0, is_mended=True, metres=0.5)
 TURNED = Cause("the sonar is turned by 20 deg", 40.0)
 ODOMETRY = "tf of odom -> base_link"
