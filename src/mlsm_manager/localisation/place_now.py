@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.scan_matching.scan_path import POSITION
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.path_checks import LARGEST_DEVIATION
-from mlsm_manager.self_check.verdict import FEWEST_CHECKED, FEWEST_MATCHED, Verdict
+from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Verdict, too_few
 from node_support.health import Health, Level
 
 _TOLD = 60.0  # s: so long a fault that was left out is told: some turns of the head, which show the place
@@ -84,9 +84,8 @@ def position_state(
         return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
-    if place.fixes < FEWEST_CHECKED:
-        so_far = f"matched so far {place.fixes}, faults show from {FEWEST_CHECKED} scans on"
-        return PositionState.PROVISIONAL, f"position provisional, {place.deviation:.1f} m: {so_far}"
+    if too_few(place.fixes):
+        return PositionState.PROVISIONAL, f"position provisional, {place.deviation:.1f} m: {too_few(place.fixes)}"
     return PositionState.GOOD, f"position good, {place.deviation:.1f} m"
 
 

@@ -8,7 +8,7 @@ from string import Template
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
-from mlsm_manager.self_check.verdict import FEWEST_CHECKED, Answer
+from mlsm_manager.self_check.verdict import Answer, too_few
 from node_support.errors import counted
 from node_support.files import package_folder
 
@@ -51,7 +51,7 @@ class Outcome(NamedTuple):
         answers = {Answer(check["answer"]) for check in checks.values()}
         if Answer.DOUBTFUL in answers or self.summary.get("causes"):
             return Standing.DOUBTFUL
-        if Answer.FINE not in answers or self.summary["matched"] < FEWEST_CHECKED:
+        if Answer.FINE not in answers or too_few(self.summary["matched"]):
             return Standing.UNMEASURED
         return Standing.FINE if answers == {Answer.FINE} else Standing.PARTLY
 

@@ -8,8 +8,7 @@ import numpy as np
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.path_checks import per_minute
-from mlsm_manager.self_check.verdict import FEWEST_CHECKED, FEWEST_MATCHED, Answer, Verdict
-from node_support.errors import counted
+from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer, Verdict, too_few
 
 WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
 
@@ -54,7 +53,7 @@ class Trust:
             said = "; ".join([*wrong, *(one.text for one in doubtful)])
             known = f"at best {self._known}" if self._is_told else _NOTHING
             return f"trust: DOUBTFUL: {said}{mended}; {known}"
-        if self.matched < FEWEST_CHECKED or not fine:
+        if too_few(self.matched) or not fine:
             return f"trust: NOT MEASURED: {self._not_measured}{mended}"
         if missing:
             names = ", ".join(one.name for one in missing)
@@ -70,8 +69,8 @@ class Trust:
     @property
     def _not_measured(self) -> str:
         reason = self.assumed.text or f"none of {len(self.verdicts)} checks had enough data"
-        if self.matched < FEWEST_CHECKED:
-            few = f"{counted(self.matched, 'scan')} matched, faults show from {FEWEST_CHECKED} scans on"
+        few = too_few(self.matched)
+        if few:
             reason = f"{few}; {self.assumed.text}" if self.assumed.text else few
         if not self._is_told:
             return f"{reason}; {_NOTHING}"

@@ -6,9 +6,18 @@ from enum import Enum
 
 import numpy as np
 
+from node_support.errors import counted
+
 FEWEST_MATCHED = 3  # scans: two tell how they lie to each other, a third one whether that holds
 FEWEST_CHECKED = 7  # scans: six show how alike scans of this water are, a seventh whether what they tell holds
 _RECORDED, _LATEST = 1e9, 2.0**31  # s since 1970 of clocks that tell the time: simulated ones begin near 0
+
+
+def too_few(matched: int) -> str:
+    """Return that so many matched scans do not show faults yet; empty where they are enough."""
+    if matched >= FEWEST_CHECKED:
+        return ""
+    return f"{counted(matched, 'scan')} matched, faults show from {FEWEST_CHECKED} scans on"
 
 
 class Answer(Enum):
