@@ -7,15 +7,14 @@ from typing import Tuple
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser
+from benchmarks.harness import benchmark_parser, placed
 from benchmarks.paths import live_figures, solved_live
 from benchmarks.twin_conditions import TwinParameters, lasting, reported
 from benchmarks.twin_water import RESOLUTION, Water, heard, water_of
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import matrices
-from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.beams.beam import Beam
 
 LENGTH, WIDTH = 200.0, 20.0  # m of the canal, which goes along +x from x = 0
 _BASIN = np.array([70.0, 60.0])  # m, length and width of each basin
@@ -80,12 +79,9 @@ def recorded_along(
     bearings = np.angle(np.exp(1j * _BEAM_ANGLE * np.arange(len(stamps))))
     strengths = heard(water, truth.at(stamps), bearings, np.zeros(2), conditions, rng)
     track = Track(truth.times, reported(truth, conditions, rng).poses * known)
-    places = matrices(track.at(stamps))
-    beams = [
-        PlacedBeam(Beam(round(1e9 * time), "sonar", bearing, row, _BIN), place, True)
-        for time, bearing, row, place in zip(stamps, bearings, strengths, places)
-    ]
-    return Recording(beams, 0, track, None)
+    rows = zip(stamps, bearings, strengths)
+    beams = [Beam(round(1e9 * time), "sonar", bearing, row, _BIN) for time, bearing, row in rows]
+    return Recording(placed(beams, track, np.eye(4)), 0, track, None)
 
 
 def main() -> None:

@@ -17,9 +17,10 @@ from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import Recording, read_recording
 from mlsm_manager.scan_matching.scan import Track
+from node_support.geometry import matrices
 from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import Request, read
-from sonar_processing.beams.beam import Beam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 
 ROOT = Path(__file__).resolve().parents[2]
 MARINA, WHOLE_MARINA = "marina_first.bag", "marina_whole_blind.bag"
@@ -46,6 +47,12 @@ def compass_alone(recording: Recording) -> Recording:
     """Return a recording of which the odometry tells nothing but the heading."""
     track = recording.track
     return recording.with_track(Track(track.times, track.poses * [0.0, 0.0, 1.0]))
+
+
+def placed(beams: List[Beam], odometry: Track, T_base_sonar: np.ndarray) -> List[PlacedBeam]:
+    """Return beams of a vehicle on its way where its odometry puts a sonar at T_base_sonar (4, 4)."""
+    places = matrices(odometry.at(np.array([beam.stamp_ns for beam in beams]) * 1e-9)) @ T_base_sonar
+    return [PlacedBeam(beam, place, True) for beam, place in zip(beams, places)]
 
 
 def mapped_as(recording: Recording, *options: str) -> MappedBag:

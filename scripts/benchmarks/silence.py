@@ -4,14 +4,13 @@ One line per tour, odometry, kind of silence and beginning of it. The error is t
 should be, the marina's against the path by its own DVL without the silence.
 """
 
-from dataclasses import replace
-from enum import Enum
 from itertools import chain
 from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
 from benchmarks import harness
+from benchmarks.fault_makers import beams_stop, deaf, odometry_missing
 from benchmarks.harness import benchmark_parser, compass_alone
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
@@ -28,12 +27,8 @@ _FIXED = 6.0  # m stated, below which a place is known
 _WRONG = 3.0  # m: as far off no wall of the map is met, and a second one is drawn
 
 
-class Silence(Enum):
-    """What is missing in the recording."""
-
-    NO_BEAMS = "no beams"
-    NO_ECHOES = "beams without echoes"
-    NOTHING = "neither beams nor odometry"
+SILENCES = {"no beams": beams_stop, "beams without echoes": deaf, "neither beams nor odometry": odometry_missing}
+"""What is missing in the recording, and what takes it out."""
 
 
 class Figures(NamedTuple):
@@ -61,22 +56,6 @@ class Figures(NamedTuple):
             f"{self.first:.2f} m off with {self.stated:.2f} m stated; then at most {self.most:.2f} m, at the end "
             f"{self.end:.2f} m; wrong but stated as sure {100.0 * self.lies:.0f} %"
         )
-
-
-def silenced(recording: Recording, kind: Silence, start: float, seconds: float) -> Recording:
-    """Return the recording without what is missing from `start` on for `seconds` [s]."""
-    end, beams = start + seconds, []
-    for placed in recording.beams:
-        if not start <= placed.beam.stamp_ns * 1e-9 < end:
-            beams.append(placed)
-        elif kind is Silence.NO_ECHOES:
-            silent = replace(placed.beam, intensities=np.zeros_like(placed.beam.intensities))
-            beams.append(replace(placed, beam=silent))
-    track = recording.track
-    if kind is Silence.NOTHING:
-        known = (track.times < start) | (track.times >= end)
-        track = Track(track.times[known], track.poses[known])
-    return replace(recording, beams=beams, track=track)
 
 
 def replayed(recording: Recording, kind: OdometryKind) -> Replayed:
@@ -138,10 +117,10 @@ def main() -> None:
     for kind in (OdometryKind(name.upper()) for name in options.odometry):
         recordings = chain(tours(options.tours, kind, options.seeds), (marina(kind) for _ in range(options.marina)))
         for name, recording, truth in recordings:
-            for silence in Silence:
+            for missing, silence in SILENCES.items():
                 for share in SHARES:
-                    start = recording.track.times[0] + share * recording.seconds
-                    missing = silenced(recording, silence, start, options.seconds)
-                    found = figures(replayed(missing, kind), truth, start, options.seconds)
-                    case = f"{name}, {kind.value.lower()}, {silence.value} from {share * recording.seconds:.0f} s on"
+                    begin = share * recording.seconds
+                    played = replayed(silence(recording, begin, options.seconds), kind)
+                    found = figures(played, truth, recording.track.times[0] + begin, options.seconds)
+                    case = f"{name}, {kind.value.lower()}, {missing} from {begin:.0f} s on"
                     print(f"{case}: {found.line()}", flush=True)

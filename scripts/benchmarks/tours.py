@@ -5,13 +5,12 @@ from typing import List, NamedTuple
 import numpy as np
 import yaml
 
-from benchmarks.harness import ROOT
+from benchmarks.harness import ROOT, placed
 from benchmarks.scans import RAYS, SonarKind
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
-from node_support.geometry import matrices
-from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.beams.beam import Beam
 from sonar_simulator.simulation.robot import RobotDescription
 from sonar_simulator.simulation.simulation import Settings, make_setup
 
@@ -30,8 +29,7 @@ class Tour(NamedTuple):
 
     def recording(self, odometry: Track) -> Recording:
         """Return the recording with an odometry."""
-        places = matrices(odometry.at(np.array([beam.stamp_ns for beam in self.beams]) * 1e-9)) @ self.T_base_sonar
-        beams = [PlacedBeam(beam, place, True) for beam, place in zip(self.beams, places)]
+        beams = placed(self.beams, odometry, self.T_base_sonar)
         return Recording(beams, 0, odometry, Truth(self.truth.times, self.truth.poses[:, :2]))
 
     def scaled(self, error: float) -> Recording:

@@ -9,10 +9,10 @@ from typing import Tuple
 import numpy as np
 from scipy.ndimage import gaussian_filter
 
+from benchmarks.harness import placed
 from benchmarks.twin_conditions import TwinParameters, reported, true_path
 from mlsm_manager.offline.recording import Recording, Truth
 from node_support.geometry import matrices, rotated
-from sonar_processing.beams.beam import PlacedBeam
 
 RESOLUTION = 0.2  # m: a tenth of the accuracy that is looked for
 _MARGIN = 80.0  # m around the path, more than the sonar's range
@@ -202,9 +202,6 @@ def twin_of(source: Recording, parameters: TwinParameters) -> Recording:
     bearings = np.array([beam.angle for beam in beams]) + mounting
     poses = path.at(stamps + parameters.delay)
     strengths = heard(water, poses, bearings, T_base_sonar[:2, 3], parameters, rng)
-    places = matrices(odometry.at(stamps)) @ T_base_sonar
-    made = [
-        PlacedBeam(replace(beam, intensities=row), place, True) for beam, row, place in zip(beams, strengths, places)
-    ]
+    made = placed([replace(beam, intensities=row) for beam, row in zip(beams, strengths)], odometry, T_base_sonar)
     times = np.arange(path.times[0], path.times[-1], 1.0)
     return Recording(made, 0, odometry, Truth(times, path.at(times)[:, :2]))
