@@ -1,18 +1,23 @@
 """Prints what a scan costs the localiser, map included, after 100 scans and after many, on a tour that never ends."""
 
 import os
+import sys
 import time
 from typing import Iterator
 
 import numpy as np
 from soaking.processes import held
 
-from benchmarks.harness import benchmark_parser
+from benchmarks.harness import ROOT, benchmark_parser
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import inverse, rotated, transformed
+
+sys.path += [str(ROOT / "test/unit"), str(ROOT / "test/unit/mlsm_manager")]
+from made_harbour import weaving
+from made_recordings import ranges_along
 
 SCANS = 10_000
 BEAMS = 60
@@ -23,8 +28,7 @@ _ODOMETRY_STEP = 0.5
 _AFTER = 2.0
 _NOISE = 0.1
 _DRIFT = 0.02
-_QUAYS = ((1.0, 0.0, 30.0), (-1.0, 0.0, 28.0), (0.0, 1.0, 20.0), (0.0, -1.0, 18.0))
-"""Walls around the origin: normal x, normal y, distance [m]."""
+_QUAYS = np.array([[-28.0, -18.0], [30.0, -18.0], [30.0, 20.0], [-28.0, 20.0]])  # m: corners of the harbour
 
 
 class _Live(ReplayParameters):
@@ -34,15 +38,9 @@ class _Live(ReplayParameters):
         return LocaliserParameters.solver_parameters(self)
 
 
-def true_path(times: np.ndarray) -> np.ndarray:
-    """Return the poses (n, 3) of a vehicle that goes round and round."""
-    phase = times / 60.0
-    return np.column_stack([12.0 * np.cos(phase), 7.0 * np.sin(2.0 * phase), 1.2 * np.sin(times / 13.0)])
-
-
 def odometry_path(times: np.ndarray) -> np.ndarray:
     """Return the poses (n, 3) by an odometry that goes a little beside the true direction."""
-    poses = true_path(times)
+    poses = weaving(times)
     return np.column_stack([rotated(poses[:, :2], np.full(len(times), _DRIFT)), poses[:, 2]])
 
 
@@ -56,22 +54,13 @@ def tour_scans(count: int, seed: int = 0) -> Iterator[Scan]:
 def _scan(number: int, rng: np.random.RandomState) -> Scan:
     stamps = (number + (np.arange(BEAMS) + 1.0) / BEAMS) * _TURN
     bearings = np.arange(BEAMS) * 2.0 * np.pi / BEAMS
-    poses = true_path(stamps)
-    ranges = _ranges(poses, bearings) + rng.normal(0.0, _NOISE, BEAMS)
+    poses = weaving(stamps)
+    ranges = ranges_along(poses[:, :2], bearings + poses[:, 2], _QUAYS) + rng.normal(0.0, _NOISE, BEAMS)
     seen = ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
     track_times = np.arange(stamps[0] - 2.0 * _TURN, stamps[-1] + _AFTER, _ODOMETRY_STEP)
     points = np.column_stack([transformed(odometry_path(stamps), seen), np.zeros(BEAMS), np.full(BEAMS, 100.0)])
     track = Track(track_times, odometry_path(track_times))
     return Scan(points, stamps, np.ones(BEAMS, dtype=bool), track, float(stamps[-1]))
-
-
-def _ranges(poses: np.ndarray, bearings: np.ndarray) -> np.ndarray:
-    ray = np.column_stack([np.cos(bearings + poses[:, 2]), np.sin(bearings + poses[:, 2])])
-    walls = np.array(_QUAYS)
-    left = walls[:, 2] - poses[:, :2] @ walls[:, :2].T
-    closing = ray @ walls[:, :2].T
-    with np.errstate(divide="ignore"):
-        return np.where(closing > 0.0, left / closing, np.inf).min(axis=1)
 
 
 def main() -> None:
@@ -97,6 +86,6 @@ def main() -> None:
 def position_error(number: int, T_map_base: np.ndarray) -> float:
     """Return how far [m] a pose (3,) is from the truth after so many scans; the map begins at the odometry's start."""
     start, end = np.zeros(1), np.array([number * _TURN])
-    truth = transformed(inverse(true_path(start))[0], true_path(end)[:, :2])
+    truth = transformed(inverse(weaving(start))[0], weaving(end)[:, :2])
     found = transformed(inverse(odometry_path(start))[0], T_map_base[np.newaxis, :2])
     return float(np.hypot(*(found - truth)[0]))

@@ -32,12 +32,12 @@ def tour(
 ) -> Tour:  # fmt: skip
     """Return a tour of `count` scans whose odometry goes `direction` [rad] beside the truth, with late beams.
 
-    path: gives the true poses (m, 3) at times (m,); by default a vehicle that weaves without regard to its heading.
+    path: gives the true poses (m, 3) at times (m,); by default `weaving`.
     corners: (k, 2) m, of the walls around the water.
     """
     rng = np.random.RandomState(seed)
     times = np.arange(0.0, count * TURN + 5.0, 0.2)
-    truth = Track(times, (path or _path)(times))
+    truth = Track(times, (path or weaving)(times))
     steps = rotated(np.diff(truth.poses[:, :2], axis=0), np.full(len(times) - 1, -direction))
     positions = np.vstack([np.zeros((1, 2)), np.cumsum(steps, axis=0)]) + truth.poses[0, :2]
     odometry = Track(times, np.column_stack([positions, truth.poses[:, 2]]))
@@ -91,12 +91,13 @@ def with_wild_odometry(scan: Scan) -> Scan:
 
 def ahead(times: np.ndarray) -> np.ndarray:
     """Return the poses (m, 3) of a vehicle that keeps going ahead, along the path of the others."""
-    poses = _path(times)
+    poses = weaving(times)
     velocity = np.gradient(poses[:, :2], times, axis=0)
     return np.column_stack([poses[:, :2], np.unwrap(np.arctan2(velocity[:, 1], velocity[:, 0]))])
 
 
-def _path(times: np.ndarray) -> np.ndarray:
+def weaving(times: np.ndarray) -> np.ndarray:
+    """Return the poses (m, 3) of a vehicle that goes round and round without regard to its heading."""
     phase = times / 60.0
     return np.column_stack([12.0 * np.cos(phase), 7.0 * np.sin(2.0 * phase), 1.2 * np.sin(times / 13.0)])
 
