@@ -68,8 +68,9 @@ def ranges_along(places: np.ndarray, angles: np.ndarray, corners: np.ndarray = H
     along = np.roll(corners, -1, axis=0) - corners
     to_corner = corners - places[:, np.newaxis]
     cross = rays[..., 0] * along[:, 1] - rays[..., 1] * along[:, 0]
-    ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
-    share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross
+    with np.errstate(divide="ignore"):
+        ranges = (to_corner[..., 0] * along[:, 1] - to_corner[..., 1] * along[:, 0]) / cross
+        share = (to_corner[..., 0] * rays[..., 1] - to_corner[..., 1] * rays[..., 0]) / cross
     return np.where((ranges > 0.0) & (share >= 0.0) & (share <= 1.0), ranges, np.inf).min(axis=1)
 
 

@@ -1,11 +1,15 @@
 """Motion models of small vehicles, and parameters of the joint solver with a DVL."""
 
+from dataclasses import replace
+
 import numpy as np
 from made_harbour import SONAR_IN_BASE
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import Compass
+from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.position_models import DvlFactors, DvlOdometry, ThrusterFactors, ThrusterOdometry
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
@@ -59,3 +63,16 @@ def errors_of(solver, made):
 def solution_of(log, odometry, state):
     """Return a run whose unknowns are `state`."""
     return Solution(log, solver_parameters(odometry=odometry), state)
+
+
+def some_state(log, odometry=DVL, delay=0.3):
+    """Return unknowns of a run that are drawn at random."""
+    nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, odometry.width))
+    return State(nodes, np.array([0.01, delay]))
+
+
+def points_of(scans, **columns):
+    """Return points of `scans` (n,) heard at (0, 0) with each node's own pose, but for `columns`."""
+    count = len(scans)
+    one, two = np.zeros(count), np.zeros((count, 2))
+    return replace(PlacedPoints(scans, two, two, two, one, np.ones(count), one, np.zeros((count, 2, 2))), **columns)

@@ -7,12 +7,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
-from made_models import DVL, HEADING, THRUSTERS, UNAIDED, solution_of, solver_parameters
+from made_models import DVL, HEADING, THRUSTERS, UNAIDED, points_of, solution_of, solver_parameters, some_state
 
 from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, Neighbours, summed
 from mlsm_manager.joint_solver.compiled_comparisons import Limits, Pairs, Surfaces, scattered_terms, weighed_pairs
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE, State
+from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE
 from mlsm_manager.joint_solver.odometry_log import as_complex
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -30,11 +30,6 @@ MODELS = [DVL, THRUSTERS, HEADING, UNAIDED]
 @pytest.fixture(scope="module")
 def log():
     return logged(tour(3, direction=0.1, delay=0.3).scans)
-
-
-def some_state(log, odometry=MODELS[0], delay=0.3):
-    nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, odometry.width))
-    return State(nodes, np.array([0.01, delay]))
 
 
 def some_points(rng, count, scans):
@@ -226,11 +221,7 @@ CUT = 2.0
 
 
 def placed(places, scans=SCANS):
-    count = len(places)
-    return PlacedPoints(
-        scans=scans[:count], places=places, arms=np.zeros((count, 2)), normals=np.zeros((count, 2)),
-        slants=np.zeros(count), qualities=np.ones(count), shares=np.zeros(count), by_run=np.zeros((count, 2, 2)),
-    )  # fmt: skip
+    return points_of(scans[: len(places)], places=places)
 
 
 def looked_at_all(places, cut):

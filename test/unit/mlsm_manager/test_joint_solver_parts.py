@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import logged, tour
-from made_models import DVL, solution_of, solver_parameters
+from made_models import DVL, solution_of, solver_parameters, some_state
 from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
 from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
-from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, Residuals, SparseSolution, State
+from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, Residuals, SparseSolution
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of, stacked, unstacked
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
@@ -23,11 +23,6 @@ from mlsm_manager.scan_matching.scan import Scan, Track
 @pytest.fixture(scope="module")
 def log():
     return logged(tour(3, direction=0.1, delay=0.3).scans)
-
-
-def some_state(log):
-    nodes = np.random.RandomState(1).normal(0.0, 0.2, (log.scan_count + 1, 5))
-    return State(nodes, np.array([0.01, 0.3]))
 
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):

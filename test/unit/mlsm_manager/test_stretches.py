@@ -3,7 +3,8 @@
 from dataclasses import dataclass
 
 import numpy as np
-from test_keyframes import CARVER, LIMIT, RESOLUTION, made_at_once, patch
+import test_keyframes
+from test_keyframes import CARVER, LIMIT, RESOLUTION, cloud, made_at_once, patch
 
 from mlsm_manager.localisation import keyframe_traces
 from mlsm_manager.localisation.keyframe_map import KeyframeMap
@@ -35,9 +36,7 @@ class Bent:
 
 def assert_same(found, wanted):
     """Compare blocks, which are kept with the precision of float32."""
-    order, other = (np.lexsort(np.column_stack([b.cells, b.mean[:, 2]]).T) for b in (found, wanted))
-    np.testing.assert_array_equal(found.cells[order], wanted.cells[other])
-    np.testing.assert_allclose(found.rows[order], wanted.rows[other], atol=1e-3)
+    test_keyframes.assert_same(found, wanted, within=1e-3)
 
 
 def settled(*clouds, carver=None):
@@ -96,22 +95,17 @@ def test_a_place_that_is_passed_for_hours_takes_no_more_memory_and_the_newest_pa
     np.testing.assert_array_equal(np.unique(made.map.blocks.cells, axis=0), np.unique(there.cells, axis=0))
 
 
-def beams(number, *echoes):
-    points = np.array([[x, y, -2.0, 50.0] for x, y in echoes])
-    return MapCloud(points, number + 0.001 * np.arange(len(points)), float(number))
-
-
 def test_what_beams_carved_away_does_not_come_back():
     gone, behind = (10.25, 0.25), (20.25, 0.25)
-    clouds = [beams(number, behind) for number in range(1, 12)]
-    made = settled(beams(0, gone), *clouds, carver=CARVER)
+    clouds = [cloud(number, behind) for number in range(1, 12)]
+    made = settled(cloud(0, gone), *clouds, carver=CARVER)
     assert len(made.map) == 1
     made.redraw(Bent(0.0))
     assert len(made.map) == 1
 
 
 def test_free_space_moves_too():
-    made = settled(beams(1, (10.25, 0.25)), carver=CARVER)
+    made = settled(cloud(1, (10.25, 0.25)), carver=CARVER)
     before = made.free.blocks.mean[:, :2]
     made.redraw(Bent(8.0))
     np.testing.assert_allclose(np.sort(made.free.blocks.mean[:, 1]), np.sort(before[:, 1]) + 8.0)

@@ -2,23 +2,13 @@
 
 import numpy as np
 import pytest
-from made_models import solver_parameters
+from made_models import points_of, solver_parameters
 
 from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
-from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.weak_directions import WeakDirections, discounted
 
 MATCHING = solver_parameters(normal_deviation=0.2)
 SCANS = 5
-
-
-def points_with(normals, scans):
-    """Return points of `scans` (n,) on surfaces with `normals` (n, 2)."""
-    count = len(normals)
-    return PlacedPoints(
-        scans=np.asarray(scans), places=np.zeros((count, 2)), arms=np.zeros((count, 2)), normals=normals,
-        slants=np.zeros(count), qualities=np.ones(count), shares=np.zeros(count), by_run=np.zeros((count, 2, 2)),
-    )  # fmt: skip
 
 
 def normals_at(angles):
@@ -34,7 +24,7 @@ def canal_normals(direction, error=0.15, seed=0):
 
 def canal(direction, error=0.15, first=0, seed=0):
     """Return points on such walls."""
-    return points_with(canal_normals(direction, error, seed), np.repeat(first + np.arange(SCANS), 40))
+    return points_of(np.repeat(first + np.arange(SCANS), 40), normals=canal_normals(direction, error, seed))
 
 
 def counted(points, matching=MATCHING):
@@ -76,7 +66,7 @@ def test_a_wall_that_closes_a_canal_tells_the_way_along_it():
 
 def test_walls_that_face_all_ways_say_as_much_as_before():
     angles = np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)
-    points = points_with(normals_at(angles), np.repeat(np.arange(SCANS), 40))
+    points = points_of(np.repeat(np.arange(SCANS), 40), normals=normals_at(angles))
     np.testing.assert_array_equal(counted(points).normals, points.normals)
 
 
@@ -105,7 +95,7 @@ def test_scans_far_from_a_scan_do_not_say_what_it_tells():
 
 def test_surfaces_of_a_map_from_before_the_run_are_told_by_the_scans_compared_with_them():
     points = canal(0.0)
-    known = points_with(canal(0.0, seed=1).normals, np.full(len(points), BEFORE_THE_RUN))
+    known = points_of(np.full(len(points), BEFORE_THE_RUN), normals=canal(0.0, seed=1).normals)
     counting = WeakDirections.of([points, known], MATCHING).without(known, points.scans)
     assert np.abs(counting.normals[:, 0]).max() < 0.03
 
@@ -116,7 +106,7 @@ def test_normals_without_error_stay_as_they_are():
 
 
 def test_no_points_have_no_weak_direction():
-    nothing = points_with(np.empty((0, 2)), np.empty(0, dtype=np.int64))
+    nothing = points_of(np.empty(0, dtype=np.int64))
     assert len(counted(nothing)) == 0
 
 

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from made_recordings import ranges_along
 
 from recordings.beams import RecordedBeams
 from recordings.motion.sweep_shifts import SweepMotion, sweep_shifts
@@ -10,28 +11,17 @@ from sonar_processing.beams.beam import Beam
 
 STEP, BINS, RESOLUTION = np.radians(1.8), 300, 0.05
 TURN = 200
-WALLS = np.array([[-5.0, -4.0], [6.0, -4.0], [6.0, 1.0], [9.0, 1.0], [9.0, 5.0], [-5.0, 5.0], [-5.0, -4.0]])
-
-
-def distance(place, angle):
-    """Return how far the nearest wall is in one direction."""
-    ahead = np.array([np.cos(angle), np.sin(angle)])
-    along, starts = np.diff(WALLS, axis=0), WALLS[:-1] - place
-    cross = ahead[0] * along[:, 1] - ahead[1] * along[:, 0]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        reach = (starts[:, 0] * along[:, 1] - starts[:, 1] * along[:, 0]) / cross
-        share = (starts[:, 0] * ahead[1] - starts[:, 1] * ahead[0]) / cross
-    return reach[(reach > 0.0) & (share >= 0.0) & (share <= 1.0)].min()
+WALLS = np.array([[-5.0, -4.0], [6.0, -4.0], [6.0, 1.0], [9.0, 1.0], [9.0, 5.0], [-5.0, 5.0]])
 
 
 def beams(place_at, steps=range(4 * TURN)):
     """Return beams, ten per second, of a head that is at `place_at(seconds)`, with speckle."""
-    generator = np.random.default_rng(1)
+    generator, angles = np.random.default_rng(1), STEP * np.array(steps)
+    ranges = ranges_along(np.array([place_at(0.1 * index) for index in range(len(steps))]), angles, WALLS)
     made = []
-    for index, step in enumerate(steps):
-        angle = step * STEP
+    for index, (angle, distance) in enumerate(zip(angles, ranges)):
         strengths = generator.exponential(8.0, BINS)
-        first = int(distance(np.asarray(place_at(0.1 * index)), angle) / RESOLUTION)
+        first = int(distance / RESOLUTION)
         strengths[first : first + 6] += 120.0
         echoes = np.minimum(strengths, 255.0).astype(np.uint8)
         made.append(Beam((index + 10) * 10**8, "sonar", angle, echoes, RESOLUTION))

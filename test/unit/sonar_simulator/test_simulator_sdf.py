@@ -18,16 +18,6 @@ BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
 BALL = "<geometry><sphere><radius>0.5</radius></sphere></geometry>"
 
 
-@pytest.fixture
-def load(tmp_path):
-    def load_text(content, version="1.6"):
-        path = tmp_path / "some.sdf"
-        path.write_text(f'<sdf version="{version}"><world name="here">{content}</world></sdf>')
-        return load_sdf(path)
-
-    return load_text
-
-
 def _model(content, pose=""):
     return f'<model name="m">{pose}<link name="l">{content}</link></model>'
 

@@ -18,17 +18,6 @@ TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 
 
 
 @pytest.fixture
-def load(tmp_path):
-    def load_text(content):
-        path = tmp_path / "some.sdf"
-        namespace = 'xmlns:sonar="https://example.org"'
-        path.write_text(f'<sdf version="1.6" {namespace}><world name="here">{content}</world></sdf>')
-        return load_sdf(path)
-
-    return load_text
-
-
-@pytest.fixture
 def model_file(tmp_path, monkeypatch):
     """Write models/NAME/model.sdf on the model path."""
     monkeypatch.setenv("GAZEBO_MODEL_PATH", f"{tmp_path / 'nowhere'}:{tmp_path / 'path'}")
