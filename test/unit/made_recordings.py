@@ -1,13 +1,14 @@
 """A small recording: a vehicle tours an angular basin, without a simulator."""
 
-from typing import Callable, Tuple
+from typing import Callable, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.offline.recording import Recording
-from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
+from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 SECONDS = 300.0
 _START = 1000.0
@@ -31,6 +32,11 @@ def wandering() -> Recording:
 def strafing() -> Recording:
     """Return as much of a vehicle on the ellipse that looks up to 86 degrees aside of where it goes."""
     return _along(lambda angle: (12.0 * np.cos(angle) - 2.0, 8.0 * np.sin(angle)), lambda angle: 1.5 * np.sin(angle))
+
+
+def scans_in(recording: Recording, parameters: Optional[EchoExtractorParameters] = None) -> List[Scan]:
+    """Return the scans of echoes that a recording holds."""
+    return [scan for scan, _ in scans_of(recording, EchoExtractor(parameters or EchoExtractorParameters()))]
 
 
 def trembling(recording: Recording) -> np.ndarray:

@@ -4,14 +4,14 @@ from dataclasses import dataclass
 from typing import Callable
 
 import numpy as np
+from made_recordings import scans_in
 
 from mlsm_manager.localisation.parameters import EstimatorName
-from mlsm_manager.offline.recording import Recording, scans_of
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters, replay
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices
 from sonar_processing.beams.beam import Beam, PlacedBeam
-from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _BEAMS, _BINS, _RESOLUTION = 120, 250, 0.2
 _SECONDS_PER_TURN = 16.0
@@ -63,7 +63,7 @@ def outcome(turn: Turn, estimator: EstimatorName, scans: int, seed: int) -> Outc
     """Map open water as map_bag does."""
     made = recording(turn, scans, seed)
     parameters = ReplayParameters(estimator=estimator)
-    found = [scan for scan, _ in scans_of(made, EchoExtractor(parameters.echoes()))]
+    found = scans_in(made, parameters.echoes())
     replayed = replay(made, found, parameters, lambda _: None)
     fixes = sum(update.accepted and update.result is not None for update in replayed.updates)
     return Outcome(len(found), fixes, float(np.hypot(*(replayed.corrected - replayed.odometry)[:, :2].T).max()))

@@ -1,5 +1,7 @@
 """Scans of a small harbour without noise: what a vehicle on a known path hears, placed by an odometry that may err."""
 
+from dataclasses import replace
+
 import numpy as np
 from made_maps import map_with
 
@@ -73,6 +75,12 @@ def drifting(turn, places=None):
 def elsewhere(turn):
     """Return such a scan of a place that is in no map."""
     return drifting(turn, np.random.RandomState(turn).uniform(-20.0, 20.0, (100, 2)))
+
+
+def later(scan, seconds):
+    """Return a scan as it would have come so many seconds later."""
+    track = Track(scan.track.times + seconds, scan.track.poses)
+    return replace(scan, times=scan.times + seconds, reference_time=scan.reference_time + seconds, track=track)
 
 
 def map_of(places, resolution=0.5):

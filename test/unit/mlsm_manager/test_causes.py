@@ -1,6 +1,5 @@
 """What is wrong with a recording is found and named, and makes what comes after it uncertain."""
 
-from dataclasses import replace
 from functools import partial
 from time import monotonic
 
@@ -10,13 +9,13 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
-from made_recordings import SECONDS, strafing, touring, trembling
+from made_recordings import SECONDS, scans_in, strafing, touring, trembling
+from made_scans import later
 
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.bag_mapping import with_steady_head
-from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
@@ -26,16 +25,11 @@ from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
 from sonar_processing.beams.beam import Beam, PlacedBeam
-from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 pytestmark = pytest.mark.long
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START, ASIDE = WHOLE.track.times[0], strafing()
-
-
-def scans_in(recording):
-    return [scan for scan, _ in scans_of(recording, EchoExtractor(EchoExtractorParameters()))]
 
 
 def found_in(recording):
@@ -267,12 +261,6 @@ def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(
     assert (np.trace(live.covariance([])) > 0.25) == bool(said)
     live.clear()
     assert live.causes([]) == []
-
-
-def later(scan, seconds):
-    """Return a scan as it would have come so many seconds later."""
-    track = Track(scan.track.times + seconds, scan.track.poses)
-    return replace(scan, times=scan.times + seconds, reference_time=scan.reference_time + seconds, track=track)
 
 
 def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from made_harbour import SONAR_IN_BASE, tour, without_positions
+from made_scans import later
 
 from mlsm_manager.localisation.joint_session import moved
 from mlsm_manager.localisation.localiser import MapInput
@@ -18,13 +19,15 @@ from node_support.geometry import composed
 from node_support.health import Health, Level
 
 SCANS = tour(12).scans
+WITHOUT_POSITIONS = [without_positions(scan) for scan in SCANS]
 PARAMETERS = MlsmCoreParameters(size_x_meters=0.0, size_y_meters=0.0)
 HEADING = profile_values(OdometryKind.HEADING)
 
 
-def localiser_after(count, **changes):
+def localiser_after(count, scans=SCANS, **changes):
+    """Return a localiser that has taken the first scans, and its updates."""
     localiser = PARAMETERS.changed(changes).build_localiser(SONAR_IN_BASE)
-    return localiser, [localiser.take_scan(scan).scan for scan in SCANS[:count]]
+    return localiser, [localiser.take_scan(scan).scan for scan in scans[:count]]
 
 
 @pytest.fixture(scope="module")
@@ -73,8 +76,7 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
 
 
 def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
-    localiser = PARAMETERS.changed({"map_input": MapInput.CLEANED}).build_localiser(SONAR_IN_BASE)
-    localiser.take_scan(SCANS[5])
+    localiser, _ = localiser_after(1, SCANS[5:], map_input=MapInput.CLEANED)
     early = MapCloud.of_scan(SCANS[3])
     assert localiser.take_cloud(early).report.inserted == len(early)
     low, high = early.points[:, :2].min(axis=0), early.points[:, :2].max(axis=0)
@@ -110,9 +112,7 @@ def test_the_first_turn_is_not_doubted_for_a_speed_that_only_the_second_tells():
 
 
 def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
-    localiser = PARAMETERS.changed({"odometry": OdometryKind.HEADING}).build_localiser(SONAR_IN_BASE)
-    for scan in tour(22).scans:
-        localiser.take_scan(scan)
+    localiser, _ = localiser_after(22, tour(22).scans, odometry=OdometryKind.HEADING)
     first, again = (next(v for v in localiser.verdicts() if v.name == "scans go on") for _ in range(2))
     assert first.limit < first.value <= 1.0
     assert again.value == first.value
@@ -147,18 +147,14 @@ def test_a_stored_map_gives_its_free_space_back(run):
 
 @pytest.mark.long
 def test_where_positions_never_change_the_compass_is_taken_for_all_there_is():
-    found, named = (PARAMETERS.changed(values).build_localiser(SONAR_IN_BASE) for values in ({}, HEADING))
-    for scan in SCANS:
-        found.take_scan(without_positions(scan))
-        named.take_scan(without_positions(scan))
+    found, named = (localiser_after(12, WITHOUT_POSITIONS, **values)[0] for values in ({}, HEADING))
     assert found.odometry == "HEADING, because positions never change"
     np.testing.assert_allclose(found.estimator.belief.theta, named.estimator.belief.theta, atol=1e-9)
     assert found.block_count == named.block_count
 
 
 def test_a_vehicle_that_first_turned_on_the_spot_is_not_taken_for_one_without_positions():
-    localiser = PARAMETERS.build_localiser(SONAR_IN_BASE)
-    localiser.take_scan(without_positions(SCANS[0]))
+    localiser, _ = localiser_after(1, WITHOUT_POSITIONS)
     assert localiser.odometry.startswith("HEADING")
     for scan in SCANS[1:]:
         localiser.take_scan(scan)
@@ -166,34 +162,25 @@ def test_a_vehicle_that_first_turned_on_the_spot_is_not_taken_for_one_without_po
 
 
 def test_positions_made_from_estimated_velocities_prove_nothing():
-    localiser = PARAMETERS.build_localiser(SONAR_IN_BASE)
-    for scan in SCANS[:4]:
-        localiser.take_scan(without_positions(scan))
-    localiser.take_scan(SCANS[4])
+    localiser, _ = localiser_after(5, [*WITHOUT_POSITIONS[:4], SCANS[4]])
     assert localiser.odometry.startswith("HEADING")
 
 
 def test_a_run_that_was_found_to_have_no_positions_goes_on_after_a_restart():
-    localiser = PARAMETERS.build_localiser(SONAR_IN_BASE)
-    for scan in SCANS[:4]:
-        localiser.take_scan(without_positions(scan))
-    again = PARAMETERS.build_localiser(SONAR_IN_BASE)
+    (localiser, _), (again, _) = localiser_after(4, WITHOUT_POSITIONS), localiser_after(0)
     assert again.restore(localiser.stored("map", {}, 0.0, "run"), same_odometry=True) == ""
-    again.take_scan(without_positions(SCANS[4]))
+    again.take_scan(WITHOUT_POSITIONS[4])
     assert again.odometry.startswith("HEADING")
     assert again.estimator.solver.log.scan_count == 5
 
 
 def test_a_named_odometry_is_not_asked_for():
-    localiser = PARAMETERS.changed({"odometry": OdometryKind.DVL}).build_localiser(SONAR_IN_BASE)
-    for scan in SCANS[:3]:
-        localiser.take_scan(without_positions(scan))
-    assert localiser.odometry == ""
+    assert localiser_after(3, WITHOUT_POSITIONS, odometry=OdometryKind.DVL)[0].odometry == ""
 
 
 @pytest.mark.parametrize("size", [30.0, 5.0])
 def test_a_jump_of_the_odometry_leaves_position_and_map_where_they_are(size):
-    jumped, whole = PARAMETERS.build_localiser(SONAR_IN_BASE), PARAMETERS.build_localiser(SONAR_IN_BASE)
+    jumped, whole = localiser_after(0)[0], localiser_after(0)[0]
     moment = SCANS[4].reference_time + 3.0
     for scan in SCANS[:9]:
         after, track = scan.times > moment, scan.track
@@ -293,20 +280,15 @@ def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
         localiser.following.correction(end, pose)
         assert localiser.notice_time(end + 1.0 + hour, pose) * hour < 0.0
         np.testing.assert_allclose(localiser.following.correction(end + 1.0 + hour, pose), expected, atol=1e-9)
-        later = SCANS[6]
-        track = Track(later.track.times + hour, later.track.poses)
-        found = localiser.take_scan(replace(later, times=later.times + hour, track=track,
-                                            reference_time=later.reference_time + hour)).scan  # fmt: skip
-        assert np.hypot(*(found.belief.theta[:2] - later.reference_pose[:2])) < 0.5
+        found = localiser.take_scan(later(SCANS[6], hour)).scan
+        assert np.hypot(*(found.belief.theta[:2] - SCANS[6].reference_pose[:2])) < 0.5
 
 
 def test_a_vehicle_that_stands_is_expected_where_it_was_when_its_clock_is_set_back():
     localiser, scan = localiser_after(0)[0], SCANS[0]
     still = Track(scan.track.times, np.tile(scan.track.poses[-1], (len(scan.track.times), 1)))
     for seconds in (0.0, 20.0, 40.0):
-        track = Track(still.times + seconds, still.poses)
-        localiser.take_scan(replace(scan, times=scan.times + seconds, track=track,
-                                    reference_time=scan.reference_time + seconds))  # fmt: skip
+        localiser.take_scan(later(replace(scan, track=still), seconds))
     assert localiser.notice_time(-3600.0, still.poses[-1]) > 0.0
     assert (localiser.is_expected, localiser.is_lost) == (True, False)
 

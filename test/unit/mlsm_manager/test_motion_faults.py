@@ -8,17 +8,15 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from benchmarks.faults import outcome, shortened, source
 from benchmarks.harness import mapped_as
-from made_recordings import touring
+from made_recordings import scans_in, touring
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
-from mlsm_manager.offline.recording import scans_of
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
-from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 TWICE_ROUND = touring()
 WHOLE, MIDDLE = shortened(TWICE_ROUND, 200.0), 100.0
@@ -115,8 +113,7 @@ def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed()
 def test_a_slip_of_the_head_is_suspected_beside_a_compass_alone_where_scans_lie_turned_as_the_vehicle_went(degrees):
     alone = broken.head_slips(WHOLE.without_positions(), MIDDLE, degrees)
     went = move_of(alone.track.poses, WHOLE.track.poses)
-    scans = [scan for scan, _ in scans_of(alone, EchoExtractor(EchoExtractorParameters()))]
-    found = echo_findings(scans, alone.sonar_in_base, Track(WHOLE.track.times, went))
+    found = echo_findings(scans_in(alone), alone.sonar_in_base, Track(WHOLE.track.times, went))
     assert found.causes == []
     assert [round(-np.degrees(slip.sizes[0]) / 4.0) for slip in found.suspected] == [6] * bool(degrees)
     np.testing.assert_allclose([slip.begin - START for slip in found.suspected], MIDDLE, atol=10.0)
@@ -134,7 +131,7 @@ def test_a_slip_of_the_head_beside_a_compass_alone_is_named_within_three_turns_w
     parameters = ReplayParameters().changed(profile_values(OdometryKind.HEADING))
     recording = broken.head_slips(TWICE_ROUND.without_positions(), 150.0, 25.0)
     localiser = parameters.build_localiser(recording.sonar_in_base)
-    scans = [scan for scan, _ in scans_of(recording, EchoExtractor(parameters.echoes()))]
+    scans = scans_in(recording, parameters.echoes())
     after = [scan for scan in scans if scan.reference_time >= START + 150.0]
     for scan in scans[: len(scans) - len(after) + 3]:
         localiser.take_scan(scan)

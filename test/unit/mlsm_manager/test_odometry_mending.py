@@ -17,7 +17,14 @@ pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START = WHOLE.track.times[0]
+TREMBLING = broken.with_compass_error(WHOLE, trembling(WHOLE))
 TURNING = broken.with_compass_error(WHOLE, 0.08 * (WHOLE.track.times - START), positions_follow=False)
+
+
+def assert_ends_as_the_whole(mended, cause):
+    assert cause.begin == pytest.approx(START + MIDDLE, abs=0.3)
+    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
+    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
 
 
 @pytest.mark.parametrize(
@@ -37,18 +44,14 @@ def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
     mended, causes = with_odometry_mended(recording, LIMITS)
     assert causes[0].text.startswith(said)
     assert causes[0].is_mended
-    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
-    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
-    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+    assert_ends_as_the_whole(mended, causes[0])
 
 
 @pytest.mark.parametrize("goes_on", [True, False])
 def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
     mended, causes = with_odometry_mended(broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on), LIMITS)
     assert causes[0].text.startswith("odometry stalled, and missed 1.")
-    assert causes[0].begin == pytest.approx(START + MIDDLE, abs=0.3)
-    apart = mended.track.at(WHOLE.track.times) - WHOLE.track.poses
-    assert np.hypot(*apart[-100:, :2].T).max() < 1.0
+    assert_ends_as_the_whole(mended, causes[0])
 
 
 @pytest.mark.parametrize(("seconds", "is_mended"), [(20.0, True), (60.0, False)])
@@ -79,11 +82,10 @@ def test_what_poses_before_the_end_of_a_stall_were_taken_for_is_not_lost():
     assert odometry.steps[0].lost <= hung.times[20] - hung.times[0]
 
 
-@pytest.mark.parametrize("measured", [True, False])
-def test_a_vehicle_whose_measured_odometry_freezes_at_once_for_longer_goes_on_as_well(measured):
-    recording = broken.with_compass_error(WHOLE, trembling(WHOLE)) if measured else WHOLE
+@pytest.mark.parametrize(("recording", "is_measured"), [(TREMBLING, True), (WHOLE, False)])
+def test_a_vehicle_whose_measured_odometry_freezes_at_once_for_longer_goes_on_as_well(recording, is_measured):
     _, causes = with_odometry_mended(broken.odometry_freezes(recording, MIDDLE, 20.0), LIMITS)
-    assert [cause.text[:29] for cause in causes] == ["odometry stalled, and missed "] * measured
+    assert [cause.text[:29] for cause in causes] == ["odometry stalled, and missed "] * is_measured
 
 
 @pytest.mark.parametrize("seconds", [3.0, 20.0])
@@ -151,11 +153,10 @@ def test_positions_that_tremble_are_smoothed():
     assert np.std(mended.track.poses[:, :2] - WHOLE.track.poses[:, :2]) < 0.2
 
 
-@pytest.mark.parametrize("measured", [True, False])
-def test_a_heading_that_stands_is_stuck_where_headings_are_measured(measured):
-    recording = broken.with_compass_error(WHOLE, trembling(WHOLE)) if measured else WHOLE
+@pytest.mark.parametrize(("recording", "is_measured"), [(TREMBLING, True), (WHOLE, False)])
+def test_a_heading_that_stands_is_stuck_where_headings_are_measured(recording, is_measured):
     _, causes = with_odometry_mended(rare.compass_sticks(recording, MIDDLE), LIMITS)
-    assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * measured
+    assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * is_measured
 
 
 @pytest.mark.parametrize("noise", [0.0, 0.02])

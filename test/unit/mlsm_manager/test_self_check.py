@@ -4,9 +4,10 @@ import re
 
 import numpy as np
 import pytest
+from made_recordings import scans_in
 from map_bag_runs import BASIN
 
-from mlsm_manager.offline.recording import read_recording, scans_of
+from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
@@ -24,7 +25,6 @@ from mlsm_manager.self_check.verdict import Verdict, merged
 from node_support.geometry import inverse, transformed
 from recordings.motion.vehicle_motion import MotionNames
 from recordings.reader import Request
-from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
 
 TIMES = np.arange(0.0, 2000.0, 1.0)
 TURN_SECONDS = 14.0
@@ -307,8 +307,7 @@ def test_a_live_vehicle_is_suspected_once_enough_turns_speak_against_it():
 @pytest.mark.parametrize(("z_is_down", "count"), [(False, 0), (True, 1)])
 def test_a_tour_of_the_basin_turned_over_is_suspected(z_is_down, count):
     recording = read_recording(BASIN, Request(motion=MotionNames(z_is_down=z_is_down)))
-    scans = [scan for scan, _ in scans_of(recording, EchoExtractor(EchoExtractorParameters()))]
-    assert len(z_down_signs(LEVEL, scans).lines()) == count
+    assert len(z_down_signs(LEVEL, scans_in(recording)).lines()) == count
 
 
 def test_a_run_whose_turns_are_reversed_is_doubted():
