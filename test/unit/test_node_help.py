@@ -68,11 +68,12 @@ def test_the_arguments_that_roslaunch_adds_do_not_hide_the_question():
     assert _help("thresholder", "__name:=other", "--help").stdout.startswith("usage: ")
 
 
-def test_every_node_is_described():
+def test_every_node_is_described_and_nothing_else():
     programs = {
         "convert_bag", "map_bag", "map_tool", "migrate_yaml", "play_852", "play_bag", "record_852", "simulate_bag",
     }  # fmt: skip
     assert {*NODES, *HOSTS, *programs} == set(EXECUTABLES)
+    assert set(PARAMETERS) <= set(NODES)
 
 
 # A node, a process of several nodes, and a command line: each writes its help in its own way.

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from document import LIVE_NODES, START_UP_NODES, generated
+from document import LIVE_NODES, generated
 
 from node_support.node_table import NODES
 from node_support.parameters import config_name, describe
@@ -15,16 +15,6 @@ ROOT = Path(__file__).resolve().parents[2]
 
 def test_generated_files_are_up_to_date():
     assert [path.name for path, text in generated().items() if path.read_text() != text] == []
-
-
-@pytest.mark.parametrize("name", [*LIVE_NODES, *START_UP_NODES])
-def test_every_node_with_parameters_is_described(name):
-    assert name in NODES
-
-
-@pytest.mark.parametrize("name", NODES)
-def test_every_described_node_has_an_executable(name):
-    assert (ROOT / "nodes" / name).is_file()
 
 
 @pytest.mark.parametrize("name", NODES)

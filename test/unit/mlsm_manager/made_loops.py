@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
-from made_harbour import selected
+from made_harbour import logged, selected, that_heard
+from made_models import followed
 
+from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import inverse, transformed
 
@@ -22,3 +24,15 @@ def astray(made, drift):
 def _heard_by(scan, number, track):
     points = transformed(track.at(scan.times), transformed(inverse(scan.track.at(scan.times)), scan.points))
     return selected(replace(scan, points=points, track=track), np.full(len(points), number not in DEAF))
+
+
+def noisy(scans):
+    """Return scans that heard echoes anywhere within 30 m instead."""
+    rng = np.random.RandomState(0)
+    around = ((scan, rng.uniform(-30.0, 30.0, (len(scan), 2))) for scan in scans)
+    return [that_heard(scan, scan.track, scan.track.at(scan.times)[:, :2] + places) for scan, places in around]
+
+
+def resumed(scans, parameters):
+    """Return a live solver after `scans` that was stored and resumed, which therefore closes no loop itself."""
+    return LiveSolver.resumed(parameters, logged(scans), followed(scans, parameters).stored())

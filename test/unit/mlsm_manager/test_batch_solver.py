@@ -4,12 +4,11 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
-from made_harbour import logged, that_heard, tour
-from made_loops import astray
+from made_harbour import that_heard, tour
+from made_loops import astray, noisy, resumed
 from made_models import followed, solver_parameters
 
 from mlsm_manager.joint_solver.batch_solver import LoopClosure, fit_of, solved_part, with_loops_closed
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.loops import Loop, agreed, loops_of
 from mlsm_manager.joint_solver.normal_equations import DELAY, RUN_COLUMNS
 from mlsm_manager.joint_solver.places import PlaceCandidate
@@ -23,9 +22,7 @@ RESUMED = 20  # scans
 
 def not_found_live(scans):
     """Return a live solver after `scans` that closed no loop itself, because it was stored and resumed on the way."""
-    parameters = solver_parameters(sonar_delay_deviation=1.0)
-    begun = followed(scans[:RESUMED])
-    solver = LiveSolver.resumed(parameters, logged(scans[:RESUMED]), begun.stored())
+    solver = resumed(scans[:RESUMED], solver_parameters(sonar_delay_deviation=1.0))
     for scan in scans[RESUMED:]:
         solver.add(scan)
     return solver
@@ -59,14 +56,7 @@ def test_a_run_that_is_not_astray_has_no_loops():
 
 
 def test_noise_makes_no_loops():
-    rng = np.random.RandomState(0)
-
-    def noisy(scan):
-        places = scan.track.at(scan.times)[:, :2] + rng.uniform(-30.0, 30.0, (len(scan), 2))
-        return that_heard(scan, scan.track, places)
-
-    solver = followed([noisy(scan) for scan in tour(40).scans])
-    assert loops_of(solver.solution) == []
+    assert loops_of(followed(noisy(tour(40).scans)).solution) == []
 
 
 def test_a_canal_makes_no_loops():

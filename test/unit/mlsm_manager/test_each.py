@@ -32,19 +32,8 @@ def test_folders_without_a_recording_are_refused(tmp_path):
 
 
 def test_every_recording_is_mapped_with_the_other_options():
-    words = [
-        "--each",
-        "a.bag",
-        "--scheduler",
-        "tcp://a:1",
-        "./b.bag",
-        "--out",
-        "maps",
-        "--refine",
-        "--set",
-        "min_range=1",
-        "--out=maps",
-    ]
+    words = ["--each", "a.bag", "--scheduler", "tcp://a:1", "./b.bag", "--out", "maps"]
+    words += ["--refine", "--set", "min_range=1", "--out=maps"]
     assert options_of_one(words, [Path("a.bag"), Path("b.bag")]) == ["--refine", "--set", "min_range=1"]
 
 

@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
-from made_harbour import HARBOUR, SONAR_IN_BASE, logged, that_heard, tour
-from made_loops import DEAF, astray
-from made_models import followed, solver_parameters
+from made_harbour import HARBOUR, SONAR_IN_BASE, tour
+from made_loops import DEAF, astray, noisy, resumed
+from made_models import solver_parameters
 from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
@@ -47,28 +47,23 @@ def test_a_closed_loop_is_said_once_with_its_age_and_the_move(run):
     assert loop.line() == "found a place heard 336 s ago again: moved by 13.6 m"
 
 
-def test_a_run_that_is_not_astray_closes_no_loop():
-    solver = LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE))
-    for scan in tour(SCANS).scans:
+def assert_closes_none(solver, scans):
+    for scan in scans:
         solver.add(scan)
         assert solver.closed is None
 
 
+def test_a_run_that_is_not_astray_closes_no_loop():
+    assert_closes_none(LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE)), tour(SCANS).scans)
+
+
 def test_noise_closes_no_loop():
-    rng, solver = np.random.RandomState(0), LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE))
-    for scan in tour(SCANS).scans:
-        places = scan.track.at(scan.times)[:, :2] + rng.uniform(-30.0, 30.0, (len(scan), 2))
-        solver.add(that_heard(scan, scan.track, places))
-        assert solver.closed is None
+    assert_closes_none(LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE)), noisy(tour(SCANS).scans))
 
 
 def test_a_resumed_run_closes_no_loop_since_the_map_stored_with_it_would_stay_behind():
     scans, _ = astray(tour(SCANS), DRIFT)
-    begun = followed(scans[:20], solver_parameters())
-    solver = LiveSolver.resumed(solver_parameters(), logged(scans[:20]), begun.stored())
-    for scan in scans[20:]:
-        solver.add(scan)
-        assert solver.closed is None
+    assert_closes_none(resumed(scans[:20], solver_parameters()), scans[20:])
 
 
 def bend_of(variances, older):

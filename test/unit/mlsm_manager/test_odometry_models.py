@@ -192,7 +192,7 @@ def test_a_scale_that_is_30_percent_off_is_found(kind, made):
 
 def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
     solver = followed(deaf(made.scans, range(8, 17)), parameters(OdometryKind.HEADING))
-    radii = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
+    radii = np.array([estimate.stated_deviation for estimate in solver.estimates])
     distance = np.hypot(*errors_of(solver, made)[:, :2].T)
     assert (np.diff(radii[8:17]) > 0.0).all()
     assert radii[16] > 3.0 * radii[7]
@@ -208,7 +208,7 @@ def unheard_beyond(scan, reach):
 def test_in_a_straight_canal_the_told_deviation_covers_the_error():
     canal = tour(45, noise=0.3, path=along_canal, corners=CANAL)
     solver = followed([unheard_beyond(scan, 30.0) for scan in canal.scans], parameters(OdometryKind.HEADING))
-    told = np.array([np.sqrt(np.trace(estimate.pose_covariance[:2, :2])) for estimate in solver.estimates])
+    told = np.array([estimate.stated_deviation for estimate in solver.estimates])
     distance = np.hypot(*errors_of(solver, canal)[:, :2].T)
     assert (distance < 3.0 * told).all()
     assert told[-1] > 5.0

@@ -1,5 +1,6 @@
 """The motion is found wherever a recording has it, and what is missing is said at once."""
 
+from functools import partial
 from pathlib import Path
 
 import foreign_bag as foreign
@@ -21,11 +22,18 @@ CSV = "time,x,y,yaw\n100,0,0,0\n105,2.5,0,0\n110,5,0,0\n"
 COMPASS = CSV.replace("yaw", "Heading_deg").replace(",0\n", ",90\n")
 
 
+def bag_with(folder, *adds):
+    """Return the path of a bag with beams and what each of `adds` writes."""
+    with foreign.of_beams(folder / "sonar.bag") as bag:
+        for add in adds:
+            add(bag)
+    return folder / "sonar.bag"
+
+
 @pytest.fixture
 def sonar_bag(tmp_path):
     """Path of a bag with beams only."""
-    with foreign.of_beams(tmp_path / "sonar.bag"):
-        return tmp_path / "sonar.bag"
+    return bag_with(tmp_path)
 
 
 def assert_goes_ahead(recording):
@@ -34,46 +42,37 @@ def assert_goes_ahead(recording):
     assert np.diff(places) == pytest.approx(foreign.SPEED * 10.0 / (foreign.BEAMS - 1), abs=1e-6)
 
 
-@pytest.mark.parametrize("add", [foreign.add_odometry, lambda bag: foreign.add_poses(bag, LOCAL_POSITION)])
+@pytest.mark.parametrize("add", [foreign.add_odometry, partial(foreign.add_poses, topic=LOCAL_POSITION)])
 def test_without_tf_the_odometry_comes_from_a_topic(tmp_path, add):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        add(bag)
-    recording = read_recording(tmp_path / "a.bag", Request())
+    recording = read_recording(bag_with(tmp_path, add), Request())
     assert_goes_ahead(recording)
     assert "because tf does not link odom and base_link" in recording.notes[0]
 
 
 def test_the_mount_is_found_through_the_frame_of_the_odometry(tmp_path):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_odometry(bag, child="hull")
-        foreign.add_fixed(bag, "hull", "head", x=2.0)
-    recording = read_recording(tmp_path / "a.bag", Request())
+    mount = partial(foreign.add_fixed, parent="hull", child="head", x=2.0)
+    recording = read_recording(bag_with(tmp_path, foreign.add_odometry, mount), Request())
     assert recording.beams[0].T_target_sonar[0, 3] == pytest.approx(2.0)
 
 
 def test_a_mount_that_tf_does_not_tell_is_that_of_the_parameters(tmp_path):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_odometry(bag)
     parameters = ReadingParameters(mount_x=1.5, upside_down=True)
-    recording = read_recording(tmp_path / "a.bag", Request(parameters=parameters))
+    recording = read_recording(bag_with(tmp_path, foreign.add_odometry), Request(parameters=parameters))
     assert recording.beams[0].T_target_sonar[:3, 3] == pytest.approx([1.5, 0.0, 0.0])
     assert recording.beams[0].T_target_sonar[2, 2] == pytest.approx(-1.0)
 
 
 @pytest.mark.parametrize("topic", ["/mavros/setpoint_position/local", "/goal", "/ground_truth/pose"])
 def test_poses_that_are_no_odometry_are_not_taken_for_one(tmp_path, topic):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_poses(bag, topic)
-    motion = read(tmp_path / "a.bag", Request()).motion
+    motion = read(bag_with(tmp_path, partial(foreign.add_poses, topic=topic)), Request()).motion
     assert motion.source is MotionSource.UNSAID
     assert "nothing says where the vehicle was" in motion.notes[0]
 
 
 def test_a_bag_in_which_something_else_moves_is_refused(tmp_path):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_fixed(bag, "earth", "ship", topic="/tf")
+    bag = bag_with(tmp_path, partial(foreign.add_fixed, parent="earth", child="ship", topic="/tf"))
     with pytest.raises(RecordingError, match="tf does not say where the vehicle was"):
-        read(tmp_path / "a.bag", Request())
+        read(bag, Request())
 
 
 def test_a_topic_that_is_asked_for_goes_before_tf():
@@ -85,39 +84,30 @@ def test_a_topic_that_is_asked_for_goes_before_tf():
 
 
 def test_with_an_imu_alone_the_heading_is_known(tmp_path):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_imu(bag)
-    assert read(tmp_path / "a.bag", Request()).motion.source is MotionSource.HEADING
+    assert read(bag_with(tmp_path, foreign.add_imu), Request()).motion.source is MotionSource.HEADING
 
 
 @pytest.mark.parametrize(
     "add",
-    [foreign.add_velocities, lambda bag: foreign.add_odometry(bag, has_positions=False)],
+    [foreign.add_velocities, partial(foreign.add_odometry, has_positions=False)],
     ids=["twists", "odometry without positions"],
 )
 def test_velocities_along_the_heading_of_an_imu_are_odometry(tmp_path, add):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_imu(bag)
-        add(bag)
-    recording = read_recording(tmp_path / "a.bag", Request())
+    recording = read_recording(bag_with(tmp_path, foreign.add_imu, add), Request())
     assert_goes_ahead(recording)
     assert "along the heading of /imu/data" in recording.notes[0]
 
 
 def test_velocities_are_along_the_axes_of_their_instrument_where_tf_places_it(tmp_path):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_imu(bag)
-        foreign.add_velocities(bag, frame="dvl", y=0.1)
-        foreign.add_fixed(bag, "base_link", "dvl", x=1.0)
-    track = read_recording(tmp_path / "a.bag", Request()).track
+    velocities = partial(foreign.add_velocities, frame="dvl", y=0.1)
+    mount = partial(foreign.add_fixed, parent="base_link", child="dvl", x=1.0)
+    track = read_recording(bag_with(tmp_path, foreign.add_imu, velocities, mount), Request()).track
     assert track.poses[-1] == pytest.approx([10.0 * foreign.SPEED, 1.0, 0.0])
 
 
 def test_velocities_without_a_heading_are_no_odometry(tmp_path):
-    with foreign.of_beams(tmp_path / "a.bag") as bag:
-        foreign.add_velocities(bag)
     with pytest.raises(RecordingError, match="/dvl/twist holds velocities, but no topic holds a heading"):
-        read(tmp_path / "a.bag", Request())
+        read(bag_with(tmp_path, foreign.add_velocities), Request())
 
 
 def test_a_vehicle_that_is_declared_as_standing_needs_nothing(sonar_bag):
