@@ -38,7 +38,7 @@ BAD_STARTS: List[Tuple[str, str, str]] = [
     ("ping360_driver", "port:=udp://nowhere", "must be udp://HOST:PORT"),
 ]
 UNKNOWN = "no_such_parameter:=1", "no_such_parameter = 1: no such parameter"
-BAD_STARTS += [(node, *UNKNOWN) for node in sorted(set(LIVE_NODES) - {node for node, *_ in BAD_STARTS})]
+BAD_STARTS += [(node, *UNKNOWN) for node in sorted(set(LIVE_NODES) - {node for node, *_ in BAD_STARTS}) + sorted(HOSTS)]
 
 
 def bad_values(field: Field) -> List[Any]:

@@ -40,6 +40,12 @@ class _Server(Server):
                 rospy.set_param(f"{self.ns}{folder}{field.name}", self.config[field.name])
 
 
+def kept_by_master(namespace: str) -> str:
+    """Return where a refused value stands: also the next start reads it there."""
+    name = rospy.resolve_name(namespace).rstrip("/")
+    return f"(rosparam get {name} shows what is set; the master keeps it until rosparam delete {name})"
+
+
 def read_parameters(parameters: Type[Parameters], namespace: str) -> Parameters:
     """Return what the parameter server holds in `namespace` ("~", or a resolved name).
 
@@ -47,11 +53,14 @@ def read_parameters(parameters: Type[Parameters], namespace: str) -> Parameters:
     holds them where they belong. Raises ParameterError for an unknown key or a value that is not allowed.
     """
     given = rospy.get_param(namespace, {}) or {}
-    values, remarks = parameters.by_name(given)
+    try:
+        values, remarks = parameters.by_name(given)
+        found = parameters(**values)
+    except ParameterError as error:
+        raise ParameterError(f"{error} {kept_by_master(namespace)}") from error
     outside = [key for key in parameters.expert_names() if key in given]
     if outside:
         remarks.append(f"under {EXPERT} belong {', '.join(outside)}, whose values go before those that stand there")
-    found = parameters(**values)
     if remarks:
         rospy.logwarn("%s: %s: %s", rospy.resolve_name(namespace), OLD_KEYS, "; ".join(remarks))
         rospy.set_param(namespace, parameters.nested(values))

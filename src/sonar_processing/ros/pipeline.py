@@ -14,7 +14,7 @@ from node_support.help import answer_help
 from node_support.parameters import ParameterError, ParameterSet
 from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
-from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
+from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, kept_by_master
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
 from sonar_processing.ros.cloud_topics import (
@@ -94,6 +94,7 @@ if TYPE_CHECKING:
     from sonar_processing.ros.shape_detectors import ShapeDetectorNode
 
 DEFAULT_CHAIN = ["thresholder", "outlier_remover", "echo_extractor"]
+_OWN_PARAMETERS = "chain", "detectors"
 
 
 class StageChain:
@@ -131,6 +132,7 @@ class Pipeline:
 
         Raises ParameterError for a bad parameter of any stage or detector.
         """
+        _refuse_other_names()
         runners = [StageRunner(name, rospy.resolve_name(name)) for name in _names("chain", DEFAULT_CHAIN, STAGES)]
         detectors = _detectors({made for runner in runners for made in runner.type.outputs.values()})
         sinks: Dict[str, List[CloudSink]] = defaultdict(list)
@@ -163,6 +165,15 @@ def _detectors(made: Collection[str]) -> List["ShapeDetectorNode"]:
         if detector.input_topic not in made:
             raise ParameterError(f"detectors = {names!r}: no stage of chain makes {detector.input_topic}")
     return detectors
+
+
+def _refuse_other_names() -> None:
+    for name, value in (rospy.get_param("~", {}) or {}).items():
+        if name not in _OWN_PARAMETERS:
+            raise ParameterError(
+                f"{name} = {value!r}: no such parameter; there are {', '.join(_OWN_PARAMETERS)}, and under the name of "
+                f"each stage its own, as /thresholder/otsu_multiplier {kept_by_master('~')}"
+            )
 
 
 def _names(parameter: str, default: List[str], known: Collection[str]) -> List[str]:
