@@ -131,7 +131,8 @@ def _draw(run: Run) -> Figure:
     course.plot(times, 2.0 * run.sent[:, 4], color="tab:pink", label="two stated deviations")
     course.plot(times, _errors(run), color="tab:green", label="off the truth")
     jumps = times[1:][np.diff(run.sent[:, 5]) != 0.0]
-    course.vlines(jumps, 0.0, run.sent[:, 4].max(), color="0.3", ls="--", label="reset_counter goes up")
+    if jumps.size:
+        course.vlines(jumps, 0.0, run.sent[:, 4].max(), color="0.3", ls="--", label="reset_counter goes up")
     top = 1.05 * 2.0 * run.sent[:, 4].max()
     course.fill_between(moments, 0.0, top, where=~is_sent, color="0.93", label="not good: nothing is sent")
     course.set(xlabel="time [s]", ylabel="[m]", xlim=(0.0, moments[-1]), ylim=(0.0, top))
