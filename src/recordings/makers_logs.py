@@ -104,19 +104,23 @@ def _is_ping_viewer_log(path: Path) -> bool:
     return True
 
 
+def _ping_viewer_log(path: Path) -> PingViewerLog:
+    """Return a log. Raises RecordingError."""
+    try:
+        return PingViewerLog(path.read_bytes())
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from None
+    except NoLogError as error:
+        raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
+
+
 def _ping_viewer_beams(path: Path) -> RecordedBeams:
     """Return the beams of a log. Raises RecordingError.
 
     A beam was taken before its message came, by as long as the head listened. Messages that are not whole or hold
     nothing count as refused.
     """
-    try:
-        log = PingViewerLog(path.read_bytes())
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}") from None
-    except NoLogError as error:
-        raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
-    stream = MessageStream()
+    log, stream = _ping_viewer_log(path), MessageStream()
     heads: Dict[int, List[Tuple[Beam, int]]] = {}
     soundings: List[Tuple[float, float]] = []
     inconsistent = 0

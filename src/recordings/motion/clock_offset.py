@@ -20,8 +20,7 @@ from sonar_processing.scans.assembler import RevolutionCollector
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan
 
-FARTHEST = 600.0
-"""s: clocks that were set by hand or by a network differ by less."""
+_FARTHEST = 600.0  # s: clocks that were set by hand or by a network differ by less
 _STEP = 1.0  # s: the vehicle turns by less than a beam is wide
 _FINE_STEP = 0.1
 _CELL = 2.0  # m: echoes within it meet, in the first search
@@ -65,16 +64,14 @@ class _Way(NamedTuple):
         return found
 
 
-def clock_offset(
-    beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray, farthest: float = FARTHEST
-) -> ClockOffset:
+def clock_offset(beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray) -> ClockOffset:
     """Return what must be added to the stamps of `beams` so that `track`, T_odom_base, has the same clock.
 
-    Looked for are offsets of up to `farthest` [s], and where the two have no time in common those around all that let
+    Looked for are offsets of up to ten minutes, and where the two have no time in common those around all that let
     one lie in the other. Raises RecordingError where the echoes do not tell.
     """
     echoes, way = _echoes(beams, T_base_sonar), _way(track)
-    offsets = _candidates(echoes, way, farthest)
+    offsets = _candidates(echoes, way)
     scores = np.array([_meeting(way.placed(echoes, offset), echoes.turn) for offset in offsets])
     clearness = _clearness(scores)
     best = float(offsets[int(np.nanargmax(scores))])
@@ -133,11 +130,11 @@ def _way(track: PoseTrack) -> _Way:
     return _Way(track.stamps_ns * 1e-9, np.column_stack([track.translations[:, :2], yaws]))
 
 
-def _candidates(echoes: _Echoes, way: _Way, farthest: float) -> np.ndarray:
+def _candidates(echoes: _Echoes, way: _Way) -> np.ndarray:
     first, last = way.times[0] - echoes.times[0], way.times[-1] - echoes.times[-1]
     if way.times[0] < echoes.times[-1] and way.times[-1] > echoes.times[0]:
         first = last = 0.0
-    return np.arange(min(first, last) - farthest, max(first, last) + farthest + _STEP, _STEP)
+    return np.arange(min(first, last) - _FARTHEST, max(first, last) + _FARTHEST + _STEP, _STEP)
 
 
 def _meeting(placed: np.ndarray, turn: np.ndarray) -> float:

@@ -4,8 +4,9 @@ import json
 
 import numpy as np
 import pytest
+from made_recordings import ranges_along
 from test_recordings_ping_viewer import PERSIAN, clock, log_bytes, text_bytes
-from test_sweep_shifts import distance
+from test_sweep_shifts import WALLS
 
 from mlsm_manager.offline.map_bag import map_bag, map_bag_arguments
 from mlsm_manager.surface_map.map_file import read_map
@@ -19,7 +20,8 @@ def sent(gradians, reach, gain, generator, is_silent=False):
     """Return what a Ping360 sends of the room in one direction."""
     length = reach / SAMPLES
     strengths = generator.exponential(4.0, SAMPLES) * (not is_silent)
-    first = int(distance(np.zeros(2), (200 - gradians) * np.pi / 200.0) / length)
+    (distance,) = ranges_along(np.zeros((1, 2)), np.array([(200 - gradians) * np.pi / 200.0]), WALLS)
+    first = int(distance / length)
     strengths[first : first + max(round(0.3 / length), 2)] += 120.0 * (not is_silent)
     data = np.minimum(strengths, 255.0).astype(np.uint8).tobytes()
     return packed(
@@ -51,7 +53,8 @@ def mapped(path, tmp_path):
 def shares_on_walls(places, directions):
     """Return which share of the walls in `directions` [gradians] have a block within 0.4 m, and of blocks a wall."""
     angles = (200.0 - np.arange(400)) * np.pi / 200.0
-    walls = np.array([distance(np.zeros(2), angle) * np.array([np.cos(angle), np.sin(angle)]) for angle in angles])
+    ranges = ranges_along(np.zeros((1, 2)), angles, WALLS)
+    walls = ranges[:, np.newaxis] * np.column_stack([np.cos(angles), np.sin(angles)])
     apart = np.hypot(*(places[:, np.newaxis] - walls).transpose(2, 0, 1)) < 0.4
     return apart[:, directions].any(axis=0).mean(), apart.any(axis=1).mean()
 

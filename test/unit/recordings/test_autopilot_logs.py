@@ -40,11 +40,12 @@ def test_the_echoes_tell_how_far_the_clocks_are_apart(seconds):
     assert found.deviation < 0.3
 
 
-def test_no_offset_is_told_where_the_vehicle_stood_or_the_turns_are_few():
+def test_no_offset_is_told_where_the_vehicle_stood_or_the_turns_are_few(monkeypatch):
+    monkeypatch.setattr("recordings.motion.clock_offset._FARTHEST", 20.0)
     made = wandering()
     beams = [placed.beam for placed in made.beams]
     with pytest.raises(RecordingError, match="give --offset"):
-        clock_offset(beams, PoseTrack.fixed(np.zeros(3), [0.0, 0.0, 0.0, 1.0]), np.eye(4), farthest=20.0)
+        clock_offset(beams, PoseTrack.fixed(np.zeros(3), [0.0, 0.0, 0.0, 1.0]), np.eye(4))
     with pytest.raises(RecordingError, match="3 turns or sweeps"):
         clock_offset(beams[:350], track_of(made), np.eye(4))
 
