@@ -120,7 +120,7 @@ class Localiser:
 
     def look_for_causes(self) -> None:
         """Look in the newest scans for what is wrong; takes seconds of a core where something is."""
-        self.following.found.look(self._newest_run)
+        self.following.found.look(self._newest_run, list(self.following.odometry.steps))
 
     def _newest_run(self) -> Optional[Solution]:
         with self._lock:

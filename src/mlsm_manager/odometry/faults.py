@@ -26,10 +26,12 @@ class FaultKind(Enum):
     DISTANCES = "reported distances changed"
     CARRIED = "a current carried the vehicle, and the odometry did not feel it"
     STUCK = "the compass stuck"
+    RIGHT = "the compass stepped beside positions that are right"
 
 
 OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
-_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK)  # that pairs of scans or headings show
+# That pairs of scans or headings show.
+_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK, FaultKind.RIGHT)
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 
 
@@ -38,7 +40,8 @@ class MotionFault:
     """begin: s, of a drift, a step or a change; NaN where it holds all along.
 
     sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; the
-    logarithm of a factor; or x y [m/s] in odom. end: s, of a current, or of a heading that stuck.
+    logarithm of a factor; or x y [m/s] in odom. end: s, of a current, or of a heading that stuck. After a step of the
+    compass that was left out positions that were right go astray: it is they that are turned.
     """
 
     kind: FaultKind
@@ -60,6 +63,8 @@ class MotionFault:
             return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
         if self.kind is FaultKind.DRIFT:
             return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
+        if self.kind is FaultKind.RIGHT:
+            return f"the compass stepped by {np.degrees(self.sizes[0]):.0f} deg beside positions that are right,"
         if self.kind in (FaultKind.STEP, FaultKind.SLIP):
             return f"the head slipped by {abs(np.degrees(self.sizes[0])):.0f} deg, or the compass stepped,"
         if self.kind is FaultKind.CARRIED:
@@ -69,7 +74,7 @@ class MotionFault:
 
     def is_beyond(self, end: float) -> bool:
         """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
-        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK):
+        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK, FaultKind.RIGHT):
             return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind is FaultKind.DRIFT else 1.0)
         return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
@@ -82,6 +87,8 @@ class MotionFault:
         if self.kind is FaultKind.CARRIED:
             since = np.clip(track.times - self.begin, 0.0, self.end - self.begin)
             return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
+        if self.kind is FaultKind.RIGHT:
+            return with_positions_turned(track, self.sizes[0], self.begin)
         steps = seen_from(track.poses[:-1], track.poses[1:])
         errors = self._errors(track)
         if self.kind in OF_DISTANCES:
@@ -125,10 +132,12 @@ class Mirror(Enum):
         return track.with_poses(np.append(start[:2], 0.0) + signs * (track.poses - np.append(start[:2], 0.0)))
 
 
-def with_positions_turned(track: Track, turn: float) -> Track:
-    """Return a track whose positions are turned by `turn` [rad]; it begins where it began, and headings stay."""
-    start = track.poses[0, :2]
-    gone = rotated(track.poses[:, :2] - start, np.full(len(track.poses), turn))
+def with_positions_turned(track: Track, turn: float, begin: float = -np.inf) -> Track:
+    """Return a track whose positions are turned by `turn` [rad] about that at `begin` [s]; headings stay, and what was
+    before.
+    """
+    start = track.at(max(begin, track.times[0]))[:2]
+    gone = rotated(track.poses[:, :2] - start, np.where(track.times >= begin, turn, 0.0))
     return track.with_poses(np.column_stack([start + gone, track.poses[:, 2]]))
 
 

@@ -31,7 +31,7 @@ TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
 class EchoFindings(NamedTuple):
     """causes: that are named. mount: the likeliest mount, where one is named; else that of tf.
 
-    suspected: faults that pairs of scans alone do not tell, beside a compass alone.
+    suspected: faults that pairs of scans alone do not tell.
     """
 
     causes: List[Cause]
@@ -59,8 +59,11 @@ def echo_findings(
     if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
-    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *carried(pairs, NAMED_FROM)]
-    return EchoFindings(ranked(found), AS_TOLD)
+    named = [cause for cause in carried(pairs, honest) if cause.evidence > NAMED_FROM]
+    # A path that gave way to a current hides it: it is suspected of the odometry itself.
+    suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
+    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
+    return EchoFindings(ranked(found), AS_TOLD, suspected)
 
 
 def _reports_positions(scans: Sequence[Scan]) -> bool:
@@ -187,7 +190,7 @@ def _suspected_slip(pairs: ScanPairs) -> List[MotionFault]:
 
 def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis) -> List[_Changed]:
     """Return the likeliest of `changes` from each scan on from which scans lie farther from those before."""
-    near, found = pairs.near(), []
+    near, found = pairs.near(pairs.honest), []
     for number, begin in enumerate(near.begins):
         across, before = (near.pairs[:, 0] < number) & (near.pairs[:, 1] >= number), near.pairs[:, 1] < number
         if across.sum() < _FEWEST_SLIPPED or before.sum() < _FEWEST_BEFORE:

@@ -43,7 +43,7 @@ _MORE = 1.05  # times as much: true distances add 3 % in a marina, and a path th
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
 _GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
 _FAULTS = 3  # at most, one after the other
-_FEWEST = 15  # nodes: fewer do not tell a change from noise
+_FEWEST = 15  # nodes: fewer do not tell a change from noise, unless pairs of scans show when
 
 
 class _Trial(NamedTuple):
@@ -65,8 +65,8 @@ def without_faults(
     besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of scans and beams
     show.
     """
-    found = MotionFindings(run, fit, track)
-    if run.parameters.node_search is not None or len(fit.node_times) < _FEWEST or not found.is_told:
+    found, are_few = MotionFindings(run, fit, track), len(fit.node_times) < _FEWEST
+    if run.parameters.node_search is not None or not found.is_told or (are_few and not suspected):
         return found
     first = places = found.places
     suspected = [one for fault in suspected if not _is_missed_turn(fault, suspected) for one in _possible(fault)]
@@ -75,7 +75,7 @@ def without_faults(
         if errors is None:
             return found
         places = errors.places
-        faults = [*_likely(errors), *suspected, *_of_sonar(found)]
+        faults = suspected if are_few else [*_likely(errors), *suspected, *_of_sonar(found)]
         if len(found.causes) == _FAULTS or not faults:
             break
         best = _best(found, faults)
@@ -83,20 +83,21 @@ def without_faults(
             break
         found = _without(found, best)
         suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
-    others = [places, first] if found.causes else [places] if _errs(errors) else []
+    others = [places, first] if found.causes else [places] if _errs(errors) and not are_few else []
     return replace(found, apart=[other - found.places for other in others])
 
 
 def _needed(found: MotionFindings, fault: Fault) -> float:
     """Return by how many nats a run must be likelier without a fault for that to be named.
 
-    Distances may change at any moment: where half of the circle was heard, a wrong change gained 6.4.
+    Distances may change at any moment, and currents begin: where half of the circle was heard, a wrong change gained
+    6.4.
     """
     if found.is_alone and fault.kind is FaultKind.CIRCLE:
         return _NATS_CIRCLE
     if found.is_alone and fault.kind in _SUDDEN:
         return _NATS_ALONE
-    return NAMED_FROM if fault.kind is FaultKind.DISTANCES else _NATS
+    return NAMED_FROM if fault.kind in (FaultKind.DISTANCES, FaultKind.CARRIED) else _NATS
 
 
 def _errs(errors: OdometryErrors) -> bool:

@@ -134,27 +134,27 @@ class ScanPairs:
         """Return what speaks for a hypothesis against another, nats."""
         return evidence_of(self.distances(other), self.distances(hypothesis), len(np.unique(self.times[:, 0])))
 
-    def near(self) -> "NearPairs":
-        """Return all pairs of scans up to three apart, as they lie if nothing is wrong."""
-        pairs, apart = near_pairs([self._placed(number, self.honest) for number in range(len(self._heard))])
+    def near(self, base: Hypothesis) -> "NearPairs":
+        """Return all pairs of scans up to three apart, as they lie if `base` is right."""
+        pairs, apart = near_pairs([self._placed(number, base) for number in range(len(self._heard))])
         begins = np.array([one.times[0] for one in self._heard])
         middles = np.array([one.times.mean() for one in self._heard])
         return NearPairs(pairs, begins, middles, apart)
 
-    def carried(self, pairs: np.ndarray, velocities: np.ndarray) -> np.ndarray:
+    def carried(self, pairs: np.ndarray, velocities: np.ndarray, base: Hypothesis) -> np.ndarray:
         """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the vehicle went by `velocities` (k, 2) [m/s]
-        faster than it does if nothing is wrong.
+        faster than it does if `base` is right.
         """
-        table, honest = np.empty((len(velocities), len(pairs))), self.honest
+        table = np.empty((len(velocities), len(pairs)))
         for column, (one, other) in enumerate(pairs):
-            earlier, later = along_x(self._placed(one, honest)), self._placed(other, honest)
+            earlier, later = along_x(self._placed(one, base)), self._placed(other, base)
             moves = velocities * (self._heard[other].times.mean() - self._heard[one].times.mean())
             table[:, column] = [_apart(earlier, later + move) for move in moves]
         return table
 
-    def in_odometry(self, velocity: np.ndarray, time: float) -> np.ndarray:
+    def in_odometry(self, velocity: np.ndarray, time: float, base: Hypothesis) -> np.ndarray:
         """Return a velocity (2,) of `carried` in odom."""
-        if not self.honest.as_solved:
+        if not base.as_solved:
             return velocity
         return rotated(velocity[np.newaxis], -self._corrections.at(np.array([time]))[:, 2])[0]
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.odometry.faults import FaultKind
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.odometry.mending import stuck_headings
-from mlsm_manager.odometry.steps import Step
+from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.echo_causes import echo_findings
@@ -49,10 +49,13 @@ class LiveCauses:
             self._places.append((scan.reference_time, float(pose[0]), float(pose[1])))
             self._is_new = True
 
-    def look(self, newest_run: Callable[[], Optional[Solution]] = lambda: None) -> None:
+    def look(
+        self, newest_run: Callable[[], Optional[Solution]] = lambda: None, steps: Sequence[Step] = ()
+    ) -> None:  # fmt: skip
         """Look for causes in the newest scans, if there is one since the last look; takes a second of a core or more.
 
-        newest_run: gives that of these scans, as it is solved; None where no solver follows them.
+        newest_run: gives that of these scans, as it is solved; None where no solver follows them. steps: of the
+        odometry, which were left out.
         """
         with self._lock:
             if not self._is_new or len(self._scans) < _FEWEST:
@@ -68,7 +71,8 @@ class LiveCauses:
         if run is not None:
             # What a stuck compass missed is not tried: the path is not mended live.
             shown = [cause.fault for cause in found if cause.fault is not None]
-            motion = _motion_of(run, [*suspected, *(fault for fault in shown if fault.kind is not FaultKind.STUCK)])
+            shown = [fault for fault in shown if fault.kind is not FaultKind.STUCK]
+            motion = _motion_of(run, [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])])
             found, by_mounts = motion.told_with(of_echoes, of_beams), motion.by_mounts
             spread = motion.spread(run.log.node_times[-1:])[0]
         found += [of_stuck(*one) for one in stuck_headings(track)]
@@ -97,6 +101,12 @@ class LiveCauses:
             places = np.array(self._places)
         causes = self.causes(steps)
         return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
+
+
+def _not_followed(steps: Sequence[Step], begin: float) -> List[MotionFault]:
+    """Return that positions did not follow a step of the compass, of each one after `begin` [s]."""
+    turned = (step for step in steps if step.kind is StepKind.COMPASS and step.begin > begin)
+    return [MotionFault(FaultKind.RIGHT, step.time, (step.turn,)) for step in turned]
 
 
 def _motion_of(run: Solution, suspected: Sequence[Fault]) -> MotionFindings:

@@ -276,14 +276,30 @@ def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
     assert slipped.begin == pytest.approx(START + 60.0, abs=10.0)
 
 
-def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows():
-    drifting = broken.compass_drifts(WHOLE, MIDDLE, 4.0)
-    localiser = LocaliserParameters().build_localiser(drifting.sonar_in_base)
-    for scan in scans_in(drifting):
+@pytest.mark.parametrize(
+    ("recording", "scans", "said"),
+    [
+        (broken.compass_drifts(WHOLE, MIDDLE, 4.0), 30, "the compass drifts by +"),
+        (broken.compass_steps(WHOLE, 60.0, 28.0, False), 12, "the compass stepped by 28 deg beside positions that are"),
+        (rare.bottom_lost(WHOLE, 60.0, 60.0), 14, "the vehicle was carried by "),
+    ],
+)
+def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows(recording, scans, said):
+    localiser = LocaliserParameters().build_localiser(recording.sonar_in_base)
+    for scan in scans_in(recording)[:scans]:
         localiser.take_scan(scan)
     localiser.look_for_causes()
-    assert localiser.following.causes()[0].text.startswith("the compass drifts by +")
+    assert localiser.following.causes()[0].text.startswith(said)
     assert np.trace(localiser.following.found.covariance([])) > 0.05
+
+
+def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
+    stepping = broken.compass_steps(WHOLE, 60.0, 28.0)
+    localiser = LocaliserParameters().build_localiser(stepping.sonar_in_base)
+    for scan in scans_in(stepping)[:12]:
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+    assert [cause.text for cause in localiser.following.causes()] == ["compass stepped by 28 deg"]
 
 
 def test_scans_that_are_not_matched_are_not_compared():

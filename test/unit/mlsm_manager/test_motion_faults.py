@@ -11,7 +11,9 @@ from benchmarks.harness import mapped_as
 from made_recordings import scans_in, touring
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
+from mlsm_manager.odometry.continuous import ContinuousOdometry
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
+from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import course_causes, course_of
@@ -30,6 +32,7 @@ LENGTH = MotionFault(FaultKind.LENGTH, np.nan, (0.1,))
 DISTANCES = MotionFault(FaultKind.DISTANCES, START + 100.0, (-0.4,))
 CARRIED = MotionFault(FaultKind.CARRIED, START + 100.0, (0.3, 0.4), START + 120.0)
 STUCK = MotionFault(FaultKind.STUCK, START + 100.0, (0.5,), START + 120.0)
+RIGHT = MotionFault(FaultKind.RIGHT, START + 100.0, (0.5,))
 
 
 @pytest.mark.parametrize("fault", [DRIFT, STEP, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
@@ -54,6 +57,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
         (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
         (replace(STUCK, sizes=(0.0,)), "the compass stuck for 20 s,"),
+        (RIGHT, "the compass stepped by 29 deg beside positions that are right,"),
     ],
 )
 def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
@@ -91,6 +95,14 @@ def test_a_path_is_fitted_without_the_fault(halved):
 def test_a_current_moves_what_comes_after_it():
     moved = (CARRIED.mended(WHOLE.track).poses - WHOLE.track.poses)[:, :2]
     np.testing.assert_allclose(moved[[0, -1]], [[0.0, 0.0], [6.0, 8.0]])
+
+
+def test_positions_beside_which_the_compass_stepped_go_on_as_they_were():
+    odometry = ContinuousOdometry(MotionLimits())
+    stepped = broken.compass_steps(WHOLE, 100.0, np.degrees(RIGHT.sizes[0]), False).track
+    odometry.take(stepped)
+    mended = RIGHT.mended(odometry.followed(stepped))
+    np.testing.assert_allclose(mended.poses, WHOLE.track.at(mended.times), atol=0.1)
 
 
 def test_a_heading_that_stuck_turns_evenly_meanwhile():
