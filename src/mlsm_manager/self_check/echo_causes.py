@@ -51,10 +51,8 @@ def echo_findings(
         return EchoFindings([], AS_TOLD)
     if not _reports_positions(scans):
         return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
-    honest, best, tried = pairs.honest, *_turned(pairs)
-    # The more causes are tried the likelier one fits by chance.
-    of_length = pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)])
-    nats = pairs.evidence(best, of_length) - np.log(tried)
+    honest = pairs.honest
+    best, nats = _turned(pairs, pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)]))
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
     if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
@@ -70,8 +68,9 @@ def _reports_positions(scans: Sequence[Scan]) -> bool:
     return any(np.ptp(scan.track.poses[:, :2], axis=0).any() for scan in scans)
 
 
-def _turned(pairs: ScanPairs) -> Tuple[Hypothesis, int]:
-    """Return the likeliest mount, and how many were tried; of several that are about as likely that with fewest errors.
+def _turned(pairs: ScanPairs, right: Hypothesis) -> Tuple[Hypothesis, float]:
+    """Return the likeliest mount, and its evidence [nats] over `right`, by which none is wrong; of several that are
+    about as likely that with fewest errors, if it explains the scans.
 
     What mirrors an odometry that goes straight ahead does little else than to turn it.
     """
@@ -79,8 +78,11 @@ def _turned(pairs: ScanPairs) -> Tuple[Hypothesis, int]:
     coarse = [pairs.best(around(side, "turn", angles)) for side in _SIDES]
     fine = [pairs.best(around(one, "turn", one.turn + _FINE * np.arange(-4, 5))) for one in coarse]
     best = pairs.best(fine)
-    simple = next(one for one in fine if one == best or pairs.evidence(best, one) < _NATS_MIRRORED)
-    return simple, len(_SIDES) * len(angles)
+    # The more causes are tried the likelier one fits by chance.
+    nats = {one: pairs.evidence(one, right) - np.log(len(_SIDES) * len(angles)) for one in fine}
+    alike = [one for one in fine if one == best or pairs.evidence(best, one) < _NATS_MIRRORED]
+    found = next((one for one in alike if nats[one] > NAMED_FROM), alike[0])
+    return found, nats[found]
 
 
 _REVERSED = {

@@ -87,6 +87,7 @@ def test_a_compass_alone_is_stuck_where_its_heading_stands_and_the_vehicle_goes_
         (broken.delayed(WHOLE, 8.0), "beams were sent"),
         (rare.axes_swapped(WHOLE), "the odometry's positions are mirrored"),
         (rare.positions_swapped(ASIDE), "the odometry's moves are mirrored"),
+        (shortened(broken.half_blind(rare.positions_swapped(ASIDE)), 100.0), "the odometry's moves are mirrored"),
         (rare.compass_reversed(WHOLE, False), "the compass counts the other way, beside positions that are right"),
         (rare.compass_reversed(ASIDE, True), "the compass counts the other way, and positions are reckoned with it"),
         (rare.bottom_lost(WHOLE, MIDDLE, 40.0), "the vehicle was carried by 1"),
