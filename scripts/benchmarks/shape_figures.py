@@ -38,13 +38,13 @@ def anywhere(seed: int) -> np.ndarray:
     return pose_matrix((rng.uniform(-50, 50), rng.uniform(-18, 18), _DEPTH), (0.0, 0.0, rng.uniform(-math.pi, math.pi)))
 
 
-def near_buoy(seed: int, distance: float = 10.0) -> np.ndarray:
-    """Return the (4, 4) pose of a sonar `distance` m from the axis of buoy number seed mod 2, any way round."""
+def near_buoy(seed: int) -> np.ndarray:
+    """Return the (4, 4) pose of a sonar 10 m from the axis of buoy number seed mod 2, any way round."""
     rng = np.random.default_rng([2, seed])
     x, y = np.full(2, np.inf)
     while abs(x) >= WALLS[0][2] - 3.0 or abs(y) >= WALLS[2][2] - 3.0:
         bearing = rng.uniform(-math.pi, math.pi)
-        x, y = BUOYS[seed % len(BUOYS)] + distance * np.array([math.cos(bearing), math.sin(bearing)])
+        x, y = BUOYS[seed % len(BUOYS)] + 10.0 * np.array([math.cos(bearing), math.sin(bearing)])
     return pose_matrix((x, y, _DEPTH), (0.0, 0.0, rng.uniform(-math.pi, math.pi)))
 
 

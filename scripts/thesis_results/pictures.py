@@ -63,11 +63,10 @@ def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> 
     return figure, figure.subplots(rows, columns, squeeze=False)
 
 
-def to_scale(axes: Axes, title: str, reach: float = 0.0, middle: Sequence[float] = (0.0, 0.0)) -> None:
-    """Make one metre as long in x as in y; with a `reach` [m], show this much around `middle` [m]."""
+def to_scale(axes: Axes, title: str, reach: float, middle: Sequence[float] = (0.0, 0.0)) -> None:
+    """Make one metre as long in x as in y, and show `reach` [m] around `middle` [m]."""
     axes.set(aspect="equal", title=title, xlabel="x, m", ylabel="y, m")
-    if reach:
-        axes.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
+    axes.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
 
 
 def _small_png(figure: Figure) -> bytes:

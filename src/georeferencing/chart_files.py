@@ -22,7 +22,7 @@ class ChartedPath:
     points: np.ndarray
 
 
-def geojson(origin: Origin, path: ChartedPath, marks: Sequence[Mark] = ()) -> bytes:
+def geojson(origin: Origin, path: ChartedPath, marks: Sequence[Mark]) -> bytes:
     """Return a collection of features: the path as a line with its times, and marks as points."""
     properties = {"name": path.name, "times": np.round(path.times, 3).tolist()}
     line = _feature("LineString", _longitude_first(origin, path.points), properties)
@@ -35,7 +35,7 @@ def marks_geojson(marks: Sequence[Mark], origin: Optional[Origin]) -> bytes:
     return _collection(_points(marks, origin), **told)
 
 
-def kml(origin: Origin, path: ChartedPath, marks: Sequence[Mark] = ()) -> bytes:
+def kml(origin: Origin, path: ChartedPath, marks: Sequence[Mark]) -> bytes:
     """Return the same as placemarks."""
     line = _coordinates(_longitude_first(origin, path.points))
     placemarks = [_placemark(path.name, f"<LineString><tessellate>1</tessellate>{line}</LineString>")]

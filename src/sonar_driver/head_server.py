@@ -149,9 +149,9 @@ class HeadServer:
         self._stop.set()
         self._wake()
 
-    def disappear(self, duration: float = float("inf")) -> None:
-        """Remove the line for `duration` seconds, or until `reappear`; it is gone when this returns."""
-        self._hide_until(time.monotonic() + duration)
+    def disappear(self) -> None:
+        """Remove the line until `reappear`; it is gone when this returns."""
+        self._hide_until(float("inf"))
         self._await(lambda: not self._present)
 
     def reappear(self) -> None:

@@ -97,13 +97,11 @@ class Inbox:
             self._messages.append(message)
             self._condition.notify_all()
 
-    def wait_for_link(self, timeout: float = PATIENCE) -> None:
+    def wait_for_link(self) -> None:
         """Wait until a publisher is connected and knows it, so that no message is missed from then on."""
         topic, listener = self._subscriber.resolved_name, rospy.get_name()
         told = f"{topic}: nobody publishes it"
-        wait_until(
-            lambda: any(listener in _others(node, topic, "o") for node in nodes_of(topic)[0]), timeout, told=told
-        )
+        wait_until(lambda: any(listener in _others(node, topic, "o") for node in nodes_of(topic)[0]), told=told)
 
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = PATIENCE) -> Any:
         """Return the first message that fits, of the newest and of all that come after it.
@@ -202,10 +200,10 @@ def wait_for_subscribers(topic: str, number: int, timeout: float = PATIENCE) -> 
     wait_until(lambda: _is_heard(topic, number), timeout, told=f"{topic}: not {number} connected listeners")
 
 
-def wait_for_links(topic: str, number: int = 1, timeout: float = PATIENCE) -> None:
+def wait_for_links(topic: str, number: int = 1) -> None:
     """Wait until somebody publishes a topic, `number` nodes listen to it, and all are connected."""
     told = f"{topic}: no publisher with {number} connected listeners"
-    wait_until(lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number), timeout, told=told)
+    wait_until(lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number), told=told)
 
 
 def _is_heard(topic: str, number: int) -> bool:
@@ -275,10 +273,10 @@ def rows(cloud: Any) -> np.ndarray:
     return data[np.lexsort(data.T[::-1])]
 
 
-def wait_for_publisher_links(publisher: rospy.Publisher, number: int, timeout: float = PATIENCE) -> None:
+def wait_for_publisher_links(publisher: rospy.Publisher, number: int) -> None:
     """Wait until `number` nodes are connected to a publisher of this process."""
     told = f"{publisher.name}: not {number} connections"
-    wait_until(lambda: publisher.get_num_connections() >= number, timeout, told=told)
+    wait_until(lambda: publisher.get_num_connections() >= number, told=told)
 
 
 def end_publishing(publisher: rospy.Publisher) -> None:

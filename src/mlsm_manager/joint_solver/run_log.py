@@ -220,7 +220,7 @@ def _selected(scan: Scan, rows: np.ndarray, end: float) -> Scan:
 _LENGTHS = "#"  # after the name of arrays of different lengths, which stand one after the other
 
 
-def stacked(items: Sequence[Any], prefix: str = "") -> Dict[str, np.ndarray]:
+def stacked(items: Sequence[Any], prefix: str) -> Dict[str, np.ndarray]:
     """Return for each field its values in all items (n), (n, ...); the fields of a nested dataclass one by one."""
     arrays = {}
     for own in fields(items[0]) if items else ():
@@ -235,7 +235,7 @@ def stacked(items: Sequence[Any], prefix: str = "") -> Dict[str, np.ndarray]:
     return arrays
 
 
-def unstacked(kind: type, arrays: Mapping[str, np.ndarray], prefix: str = "") -> List[Any]:
+def unstacked(kind: type, arrays: Mapping[str, np.ndarray], prefix: str) -> List[Any]:
     """Return the dataclasses of type `kind` that `stacked` took; none where `arrays` has no such field.
 
     Raises KeyError for a field that is missing, and ValueError for fields that are not equally long.

@@ -26,10 +26,10 @@ def heard(turns, posts=POSTS, seed=0):
     return [_scan(turn * _TURN_SECONDS, track, posts, rng) for turn in range(turns)]
 
 
-def cluttered(scans, count=10, seed=0):
-    """Return the scans with `count` strong echoes more each, anywhere in 50 x 26 m around the vehicle."""
-    rng = np.random.RandomState(seed)
-    return [_with_clutter(scan, rng.uniform([-25.0, -13.0], [25.0, 13.0], (count, 2)), rng) for scan in scans]
+def cluttered(scans):
+    """Return the scans with ten strong echoes more each, anywhere in 50 x 26 m around the vehicle."""
+    rng = np.random.RandomState(0)
+    return [_with_clutter(scan, rng.uniform([-25.0, -13.0], [25.0, 13.0], (10, 2)), rng) for scan in scans]
 
 
 def _with_clutter(scan, places, rng):

@@ -33,9 +33,9 @@ from mlsm_manager.scan_matching.scan import Track
 PART = 5.0  # s
 
 
-def particles_of(seed, count=40, nodes=4):
+def particles_of(seed, count=40):
     rng = np.random.RandomState(seed)
-    return Particles(rng.normal(0.0, 2.0, (count, nodes, 2)), rng.normal(0.0, 0.3, (count, 2)), rng.normal(size=count))
+    return Particles(rng.normal(0.0, 2.0, (count, 4, 2)), rng.normal(0.0, 0.3, (count, 2)), rng.normal(size=count))
 
 
 def resting(count, nodes):

@@ -53,9 +53,9 @@ def resumed(stored, same_odometry=True):
     return localiser
 
 
-def begun_anew(scans, origin=(12.0, -9.0, 0.4)):
-    """Return the scans as an odometry places them that counts from elsewhere: its frame lies at `origin` (3,)."""
-    return [moved(scan, np.array(origin)) for scan in scans]
+def begun_anew(scans):
+    """Return the scans as an odometry places them that counts from elsewhere."""
+    return [moved(scan, np.array([12.0, -9.0, 0.4])) for scan in scans]
 
 
 def sector_of(scan, beams=14):

@@ -84,9 +84,9 @@ def test_an_error_of_the_speed_that_was_found_goes_on():
     np.testing.assert_allclose(found, 0.2 * TIMES, atol=1e-9)
 
 
-def with_fading(time, pose, speed, usual=0.0, times=20.0):
+def with_fading(time, pose, speed, usual):
     belief = belief_of(time, pose, speed)
-    return replace(belief, fading=Fading(np.array([usual, 0.0, 0.0]), np.full(3, times)))
+    return replace(belief, fading=Fading(np.array([usual, 0.0, 0.0]), np.full(3, 20.0)))
 
 
 def test_a_speed_that_fades_goes_on_as_it_is_expected():

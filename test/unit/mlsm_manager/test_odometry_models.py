@@ -36,8 +36,8 @@ def model_of(kind, **changes):
     return parameters(kind, **changes).odometry
 
 
-def some_nodes(model, seed=2):
-    nodes = np.random.RandomState(seed).normal(0.0, 0.05, (3, model.width))
+def some_nodes(model):
+    nodes = np.random.RandomState(2).normal(0.0, 0.05, (3, model.width))
     if model.mixture is not None:
         nodes[:, list(model.mixture.columns)] = nodes[0, list(model.mixture.columns)]  # they do not walk
     if "odometry_scale" in model.calibrated:

@@ -7,8 +7,8 @@ from node_support.thin_queue import ThinQueue
 RATE = 24000.0  # bytes a second: three quarters of 256 kbit/s
 
 
-def sent_by(queue, start, end, step=0.25):
-    return [one for now in np.arange(start, end, step) for one in queue.take(now)]
+def sent_by(queue, start, end):
+    return [one for now in np.arange(start, end, 0.25) for one in queue.take(now)]
 
 
 def test_what_is_sent_fits_the_link():

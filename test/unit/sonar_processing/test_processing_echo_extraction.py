@@ -44,9 +44,9 @@ def with_speckle(image, seed, strength=30.0):
     return image + np.random.default_rng(seed).rayleigh(strength / 3.0, image.shape).astype(np.float32)
 
 
-def binary_image(starts, lengths, bins=400):
+def binary_image(starts, lengths):
     """Return (beams, bins) uint8 of strengths 0 and 127: one run per beam."""
-    bin_numbers = np.arange(bins)
+    bin_numbers = np.arange(400)
     starts, lengths = np.asarray(starts)[:, np.newaxis], np.asarray(lengths)[:, np.newaxis]
     return np.where((bin_numbers >= starts) & (bin_numbers < starts + lengths), 127, 0).astype(np.uint8)
 

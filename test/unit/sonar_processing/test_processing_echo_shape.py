@@ -14,11 +14,11 @@ def heard(*turns, resolution=0.1):
     return statistics
 
 
-def echoing(sigma, noise=0.0, seed=0, beams=120, resolution=0.1):
+def echoing(sigma, noise=0.0, seed=0, beams=120):
     """Return (beams, bins) with one echo per beam, of `sigma` [m] along range, anywhere."""
     rng, bins = np.random.RandomState(seed), np.arange(400)
     places = rng.uniform(60.0, 340.0, beams)[:, np.newaxis]
-    echoes = 90.0 * np.exp(-0.5 * ((bins - places) * resolution / sigma) ** 2)
+    echoes = 90.0 * np.exp(-0.5 * ((bins - places) * 0.1 / sigma) ** 2)
     return echoes + np.abs(rng.normal(0.0, noise, (beams, 400)))
 
 

@@ -53,9 +53,9 @@ def _circles(cloud, **values):
     return CircleDetector(CircleDetectorParameters(**values))(cloud, lambda times: np.zeros((len(times), 2)))
 
 
-def _seen_circle(center, radius, step=0.0175, width=0.0436):
+def _seen_circle(center, radius):
     """Return one point for each beam from the origin that meets a circle, on the beam's axis at its mean range."""
-    center = np.asarray(center)
+    center, step, width = np.asarray(center), 0.0175, 0.0436
     axis, reach = math.atan2(center[1], center[0]), math.asin(radius / np.linalg.norm(center)) + width / 2.0 - 0.002
     bearings = axis + np.arange(-reach + step / 3.0, reach, step)
     units = np.column_stack([np.cos(bearings), np.sin(bearings)])

@@ -17,10 +17,10 @@ def _vehicle(**values):
     return CommandedVehicle(PARAMETERS.changed(values), np.array([1.0, 2.0, -2.0, 0.0]))
 
 
-def _driven(vehicle, twist, until, rate=10.0, start=0.0):
-    """Command a twist at a steady rate and return the states."""
+def _driven(vehicle, twist, until, start=0.0):
+    """Command a twist ten times a second and return the states."""
     states = []
-    for time in np.arange(start, until, 1.0 / rate):
+    for time in np.arange(start, until, 0.1):
         vehicle.command(time, np.asarray(twist, dtype=float))
         states.append(vehicle.state(time))
     return states

@@ -32,8 +32,8 @@ def _strengths(contacts, **values):
     return make_echo_model("physical", values).echoes(contacts, np.random.default_rng(0))
 
 
-def _silence(beams, rays=10):
-    return Contacts.of_ranges(np.full((beams, rays), np.inf))
+def _silence(beams):
+    return Contacts.of_ranges(np.full((beams, 10), np.inf))
 
 
 @pytest.mark.parametrize(
