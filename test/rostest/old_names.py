@@ -8,7 +8,8 @@ from typing import Any
 import genpy.dynamic
 import rospy
 from geometry_msgs.msg import Point
-from graph import Diagnostics, Inbox, run, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run
+from messages import publisher
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, Header
 
@@ -23,20 +24,13 @@ NOETIC = INDIGO + "bool antiwindup\n"
 HEADER = f"{'=' * 80}\nMSG: std_msgs/Header\nuint32 seq\ntime stamp\nstring frame_id\n"
 
 
-def sender(topic: str, kind: Any) -> rospy.Publisher:
-    """Return a publisher to which the node is connected."""
-    publisher = rospy.Publisher(topic, kind, queue_size=10)
-    wait_for_publisher_links(publisher, 1)
-    return publisher
-
-
 class ThesisTopics(unittest.TestCase):
     """Sends what the nodes of today send, and listens where programs of 2015 do."""
 
     def check_passed_on(self, topic: str, old: str, message: Any) -> None:
         inbox = Inbox(old, type(message))
         inbox.wait_for_link()
-        sender(topic, type(message)).publish(message)
+        publisher(topic, type(message)).publish(message)
         inbox.wait_for(lambda found: found == message)
 
     def test_the_matched_scan_is_the_debug_cloud(self) -> None:
@@ -54,7 +48,7 @@ class ThesisTopics(unittest.TestCase):
             inbox.wait_for_link()
         ahead = Wall(distance=8.0, orientation=math.pi / 2.0, start=Point(-3.0, 8.0, -2.0), end=Point(1.0, 8.0, -2.0))
         dot = Wall(start=Point(5.0, 0.0, 0.0), end=Point(5.0, 0.0, 0.0))
-        sender("/sonar/scan/line/coefficients", Walls).publish(Walls(Header(frame_id="odom"), [ahead, dot]))
+        publisher("/sonar/scan/line/coefficients", Walls).publish(Walls(Header(frame_id="odom"), [ahead, dot]))
         self.assertEqual(walls.wait_for_number(2)[:2], [ahead, dot])
         found = models.wait_for_number(2)
         self.assertEqual(found[0].values, (-3.0, 8.0, -2.0, 1.0, 0.0, 0.0))
@@ -70,7 +64,7 @@ class ThesisTopics(unittest.TestCase):
         joints.wait_for_link()
         for number, definition in enumerate((INDIGO, NOETIC), start=1):
             kind = genpy.dynamic.generate_dynamic(STATE, definition + HEADER)[STATE]
-            states = sender(f"{SERVO}/state", kind)
+            states = publisher(f"{SERVO}/state", kind)
             states.publish(kind(process_value=math.nan))
             states.publish(kind(header=Header(frame_id="servo"), process_value=0.25 * number))
             found = joints.wait_for(lambda joint, angle=0.25 * number: joint.position == (angle,))

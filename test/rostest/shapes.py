@@ -6,7 +6,8 @@ import unittest
 
 import numpy as np
 import rospy
-from graph import Diagnostics, Inbox, run, wait_for_links, wait_for_publisher_links
+from graph import Diagnostics, Inbox, run, wait_for_links
+from messages import publisher
 from sensor_msgs.msg import PointCloud2
 from visualization_msgs.msg import Marker, MarkerArray
 
@@ -45,8 +46,7 @@ class Shapes(unittest.TestCase):
         cls.circles = Inbox("/sonar/scan/circle/coefficients", Circles)
         cls.wall_points = Inbox("/sonar/scan/line", PointCloud2)
         cls.wall_markers = Inbox("/sonar/scan/line/markers", MarkerArray)
-        cls.clouds = rospy.Publisher("clouds", StampedIntensityCloud, queue_size=10)
-        wait_for_publisher_links(cls.clouds, 2)
+        cls.clouds = publisher("clouds", StampedIntensityCloud, listeners=2)
         wait_for_links("/tf_static", 2)
         for inbox in (cls.walls, cls.circles, cls.wall_points, cls.wall_markers):
             inbox.wait_for_link()

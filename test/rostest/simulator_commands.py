@@ -9,7 +9,8 @@ import unittest
 
 import rospy
 from geometry_msgs.msg import Twist
-from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, run, wait_for_publisher_links
+from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, run
+from messages import publisher
 from nav_msgs.msg import Odometry
 
 from underwater_map_construction.msg import StampedIntensityCloud
@@ -41,8 +42,7 @@ class SimulatorCommands(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.truth, cls.diagnostics = Inbox("/ground_truth", Odometry), Diagnostics()
-        cls.commands = rospy.Publisher("cmd_vel", Twist, queue_size=1)
-        wait_for_publisher_links(cls.commands, 1)
+        cls.commands = publisher("cmd_vel", Twist)
 
     def _drive(self, command: Twist, fits: object) -> Odometry:
         """Repeat a command until the truth fits."""
@@ -80,8 +80,7 @@ class SimulatorCommands(unittest.TestCase):
 
     def test_time_waits_for_echoes_that_are_overdue(self) -> None:
         """They came each second; two seconds after the last ones time stands, until others come."""
-        echoes = rospy.Publisher("sonar/scan/echoes", StampedIntensityCloud, queue_size=10)
-        wait_for_publisher_links(echoes, 1)
+        echoes = publisher("sonar/scan/echoes", StampedIntensityCloud)
         last = rospy.Time.now()
         for seconds in (1.0, 0.0):
             echoes.publish(_echoes(last - rospy.Duration(seconds)))
@@ -91,8 +90,7 @@ class SimulatorCommands(unittest.TestCase):
         held = self._held_time()
         echoes.unregister()  # as if their sender had ended
         self.truth.wait_for(lambda m: m.header.stamp > held + rospy.Duration(20.0))
-        echoes = rospy.Publisher("sonar/scan/echoes", StampedIntensityCloud, queue_size=10)
-        wait_for_publisher_links(echoes, 1)
+        echoes = publisher("sonar/scan/echoes", StampedIntensityCloud)
         echoes.publish(_echoes(rospy.Time.now()))
         self._held_time()
         echoes.unregister()

@@ -10,7 +10,8 @@ import rospkg
 import rospy
 import yaml
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import PACKAGE_ROOT, Diagnostics, Inbox, run, skip, wait_for_links, wait_for_publisher_links
+from graph import PACKAGE_ROOT, Diagnostics, Inbox, run, skip, wait_for_links
+from messages import publisher
 from nav_msgs.msg import Odometry
 from rep_rules import broken_rules, broken_tree
 from tf2_msgs.msg import TFMessage
@@ -36,17 +37,15 @@ class Standing(unittest.TestCase):
         cls.filtered = Inbox("/odometry/filtered", Odometry)
         cls.filter = start_filter()
         cls.diagnostics = Diagnostics()
-        publisher = rospy.Publisher("/sonar/scan/echoes", StampedIntensityCloud, queue_size=SCANS)
-        wait_for_publisher_links(publisher, 1)
+        cls.publisher = publisher("/sonar/scan/echoes", StampedIntensityCloud)
         wait_for_links("/tf_static")
         cls.fixes.wait_for_link()
         cls.poses.wait_for_link()
         cls.transforms.wait_for()
         start = rospy.Time.now().to_sec()
         for turn in range(SCANS):
-            publisher.publish(cloud_to_message(scan(start + turn * SECONDS, 0.5 * (turn > 0))))
+            cls.publisher.publish(cloud_to_message(scan(start + turn * SECONDS, 0.5 * (turn > 0))))
         cls.diagnostics.wait_for("mlsm_core", "scans in", SCANS)
-        cls.publisher = publisher
 
     def test_every_scan_after_the_first_gives_a_fix(self) -> None:
         """They lie 0.5 m from where the first was taken."""
