@@ -11,7 +11,7 @@ from typing import List
 from benchmarks.harness import Row, print_table
 
 SECTIONS = {
-    "map": "map_figures.rows", "large-map": "map_figures.large_rows", "carving": "map_bag_figures.carving_rows",
+    "large-map": "map_figures.rows", "carving": "map_bag_figures.carving_rows",
     "map-bag": "map_bag_figures.rows", "matching": "matching_figures.rows", "chain": "chain_figures.rows",
     "shapes": "shape_figures.rows", "simulation": "simulation_figures.rows",
 }  # fmt: skip

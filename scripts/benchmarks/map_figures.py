@@ -16,47 +16,12 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 
 RESOLUTION = 0.5
 MILLION = 1_000_000
-_SMALL, _LARGE, _POINTS = 10_000, MILLION, 60_000
+_SMALL = 10_000
 _SCAN_RADIUS, _REACH = 50.0, 70.0
 _ECHOES, _BEAM_WIDTH, _SCANS = 400, 0.0436, 20
 
 
-def scan(rng: np.random.Generator, center: np.ndarray, points: int) -> np.ndarray:
-    """Return random points (n, 4) all over a disc and its depth: the hardest case, nearly every point its own block."""
-    low, high = np.array([[-_SCAN_RADIUS, -_SCAN_RADIUS, -5.5, 0.0], [_SCAN_RADIUS, _SCAN_RADIUS, 0.0, 127.0]])
-    return rng.uniform(low, high, (points, 4)) + np.append(center, [0.0, 0.0])
-
-
-def grown_map(blocks: int, extent: float, rng: np.random.Generator) -> MultiLevelSurfaceMap:
-    """Return a map of at least `blocks` blocks."""
-    surface_map = MultiLevelSurfaceMap(RESOLUTION)
-    while len(surface_map) < blocks:
-        surface_map.insert(scan(rng, rng.uniform(-extent, extent, 2), 20_000))
-    return surface_map
-
-
 def rows() -> List[Row]:
-    """Return insertion into a small and a large map, in turn, so that both see the same machine, and markers."""
-    rng = np.random.default_rng(1)
-    maps = [grown_map(_SMALL, 0.0, rng), grown_map(_LARGE, 900.0, rng)]
-    taken = []
-    for _ in range(15):
-        new = scan(rng, np.zeros(2), _POINTS)
-        taken.append([cpu_seconds(lambda m=surface_map, s=new: m.insert(s)) for surface_map in maps])
-    small, large = (f"{_POINTS / seconds / 1e6:.2f} million points/s" for seconds in np.median(taken, axis=0))
-    ratio, size = np.median([after / before for before, after in taken]), maps[1].nbytes / len(maps[1])
-    blocks, markers = grown_map(20_000, 20.0, np.random.default_rng(2)).blocks, BlockMarkers()
-    published = median_seconds(lambda: markers.whole(blocks, Header(frame_id="map")).serialize(BytesIO()))
-    return [
-        (f"insert into {_LARGE} blocks", large, ">= 0.5"),
-        (f"insert into {_SMALL} blocks", small, ">= 0.5"),
-        ("time in the large map / in the small one", f"{ratio:.2f}", "<= 1.2"),
-        (f"memory in use by {len(maps[1])} blocks", f"{size:.0f} bytes/block", "<= 120"),
-        (f"markers of {len(blocks)} blocks", f"{1e3 * published:.1f} ms", "a few ms"),
-    ]
-
-
-def large_rows() -> List[Row]:
     """Return the figures of files of a million blocks, and of scans in a small map and in one of ten million."""
     rng = np.random.default_rng(2)
     return [*_file_rows(), *(row for size in (_SMALL, 10 * MILLION) for row in _scan_rows(_sea_floor(size, rng), rng))]
