@@ -17,10 +17,10 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import wrapped
 from sonar_simulator.simulation.scripted_vehicle import VehicleScript
 
-STARTS = 100
+_STARTS = 100
 NEAR, NEAR_YAW = 0.5, np.radians(3.0)
 _FIXED = np.array([1e-3, 1e-3, 1e-4, 1e-3, 1e-3])  # deviations of what is known
-SCANS = 250  # in each situation without a place
+_SCANS = 250  # in each situation without a place
 WIDE = {"search_distance": 6.5, "search_angle": float(np.radians(48.0)), "candidates": 12}
 _SIGMAS = 4.0
 _DEVIATIONS = np.append([1.5, 1.5, 0.15], _FIXED)
@@ -45,13 +45,13 @@ def tour_stops() -> np.ndarray:
     return np.array([[pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])] for pose in poses])
 
 
-def start_rows(kind: SonarKind, first_seed: int = 0, count: int = STARTS) -> List[Row]:
-    """Return how many of `count` starts converge, narrow and wide."""
+def start_rows(kind: SonarKind, first_seed: int) -> List[Row]:
+    """Return how many of the starts converge, narrow and wide."""
     maker, rows = ScanMaker("basin", kind), []
     target = tour_map(maker)
     for distance, angle, changes, limit in ((3.0, 20.0, {}, 50), (6.0, 45.0, WIDE, 100)):
         matcher = DistributionMatcher(replace(NEARBY, **changes), BEAM_WIDTH, 0.0)
-        cases = [_start(maker, distance, np.radians(angle), seed) for seed in range(first_seed, first_seed + count)]
+        cases = [_start(maker, distance, np.radians(angle), seed) for seed in range(first_seed, first_seed + _STARTS)]
         results, times = [], [time.thread_time()]
         for scan, belief, _ in cases:
             results.append(matcher.match(scan, target, belief))
@@ -61,8 +61,8 @@ def start_rows(kind: SonarKind, first_seed: int = 0, count: int = STARTS) -> Lis
         accepted = np.array([result.accepted for result in results])
         title = f"starts {distance:g} m and {angle:g} deg off, basin, {kind}"
         rows += [
-            (f"{title}: converge", f"{(accepted & found).sum()} of {count}", f">= {0.99 * count:g}"),
-            (f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {count}", "0"),
+            (f"{title}: converge", f"{(accepted & found).sum()} of {_STARTS}", f">= {0.99 * _STARTS:g}"),
+            (f"{title}: accepted elsewhere", f"{(accepted & ~found).sum()} of {_STARTS}", "0"),
             (f"{title}: time of a core", f"{1e3 * np.median(np.diff(times)):.0f} ms", f"<= {limit} ms"),
         ]
     return rows
@@ -114,15 +114,15 @@ def cases(kind: SonarKind) -> Dict[str, Callable[[int], Case]]:
     }
 
 
-def false_rows(kind: SonarKind, first_seed: int = 0) -> List[Row]:
+def false_rows(kind: SonarKind, first_seed: int) -> List[Row]:
     """Return how many scans were accepted with a covariance that excludes the truth."""
     matcher = DistributionMatcher(NEARBY, BEAM_WIDTH, 0.0)
     rows: List[Row] = []
     for title, make in cases(kind).items():
-        seeds = range(first_seed, first_seed + SCANS)
+        seeds = range(first_seed, first_seed + _SCANS)
         outcomes = [_outcome(matcher, make(seed), seed) for seed in seeds]
         wrong, accepted = sum(o[0] for o in outcomes), sum(o[1] for o in outcomes)
-        text = f"{wrong} of {SCANS} ({accepted} accepted)"
+        text = f"{wrong} of {_SCANS} ({accepted} accepted)"
         rows.append((f"false fixes on {title}, {kind}", text, "0"))
     return rows
 

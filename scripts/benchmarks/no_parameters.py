@@ -15,7 +15,6 @@ import numpy as np
 from thesis_results.moves import moves_figures
 
 from benchmarks.harness import benchmark_parser, compass_alone, mapped_as, marina
-from benchmarks.matching_figures import start_rows
 from benchmarks.paths import PathFigures, judged
 from benchmarks.scans import KINDS, SonarKind
 from benchmarks.tours import simulated
@@ -38,7 +37,7 @@ _DRAWN = {
 }
 """What is wrong with an odometry of DVL and compass besides its usual errors; of these rows NEES should be 1."""
 _GOES_AND_STANDS = (15.0, 5.0)  # s, mean durations
-_MOVES, _STARTS = "thesis's three moves, 30 % off", 30
+_MOVES = "thesis's three moves, 30 % off"
 _COLUMNS = ("live", "refined", "shape", "NEES", "refined", "stated", "refined", "ms", "odometry found")
 
 
@@ -190,7 +189,4 @@ def main() -> None:
             seeds = arguments.first + np.arange(min(row.seeds, arguments.seeds))
             print_line(name, line([outcome(row.made(int(seed)), row.named) for seed in seeds]))
     if wanted.search(_MOVES):
-        print_line(_MOVES, moves_figures(_STARTS))
-    if wanted.search("starts in a known map"):
-        for title, found, _ in start_rows(KINDS[0], count=_STARTS):
-            print_line(title, [found])
+        print_line(_MOVES, moves_figures())

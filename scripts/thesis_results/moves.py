@@ -252,20 +252,20 @@ def session_errors(scans: List[Scan], estimator: Estimator) -> np.ndarray:
     return np.array(rows)
 
 
-def moves_figures(runs: int) -> List[str]:
-    """Return cells for scripts/bench --no-parameters, of `runs` runs mapped with map_bag's defaults.
+def moves_figures() -> List[str]:
+    """Return cells for scripts/bench --no-parameters, of runs mapped with map_bag's defaults.
 
     Distance, NEES per axis and stated deviation are those at the still scans. A run is corrected from the second scan
     on if each of its positions is at least twice as near to the truth as the odometry's.
     """
     maker, track = ScanMaker("basin", _SHARP), session_track()
     options = map_bag_arguments(["recording", "--out", "nowhere"])
-    found = [_localised(session_scans(maker, seed, track), options.parameters) for seed in range(runs)]
+    found = [_localised(session_scans(maker, seed, track), options.parameters) for seed in range(SEEDS)]
     still = np.concatenate([one[np.array(AT_REST)] for one in found])
     distance, _, nees, stated, seconds = still.T
     corrected = sum(bool((one[1:, 0] < _CORRECTED * one[1:, 1]).all()) for one in found)
     numbers = [f"{distance.mean():.2f}", "", "", f"{nees.mean():.2f}", "", f"{np.median(stated):.2f}", ""]
-    return [*numbers, f"{1e3 * np.median(seconds):.0f}", f"{corrected} of {runs} corrected from the second scan on"]
+    return [*numbers, f"{1e3 * np.median(seconds):.0f}", f"{corrected} of {SEEDS} corrected from the second scan on"]
 
 
 def _localised(scans: List[Scan], parameters: ReplayParameters) -> np.ndarray:
