@@ -13,13 +13,12 @@ from typing import Set
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point
-from graph import PACKAGE_ROOT, PATIENCE, forget_links, run, temporary_folder, wait_for_publisher_links, wait_until
+from graph import PATIENCE, forget_links, run, temporary_folder
 from messages import still_cloud
+from resumed_vehicle import held_points, started_core
 
 from mlsm_manager.surface_map.map_file import read_map
 from underwater_map_construction.msg import StampedIntensityCloud
-from underwater_map_construction.srv import GetRegion
 
 PERIOD = 0.3
 CLOUD_PERIOD = 0.05
@@ -39,7 +38,6 @@ class KilledNode:
         rospy.set_param(f"{namespace}/mlsm_core/start_matching", False)
         rospy.set_param(f"{namespace}/mlsm_core/map_input", "CLEANED")
         self._publisher = rospy.Publisher(f"{namespace}/sonar/scan/cleaned", StampedIntensityCloud, queue_size=10)
-        self._get_region = f"{namespace}/mlsm_core/get_region"
         self._sent = 0
 
     def die_often(self, kills: int) -> Set[int]:
@@ -72,27 +70,11 @@ class KilledNode:
             node.wait()
 
     def _started(self, *starter: str) -> "subprocess.Popen[bytes]":
-        command = [*starter, str(PACKAGE_ROOT / "nodes/mlsm_core"), f"__ns:={self._namespace}"]
-        node = subprocess.Popen(command, start_new_session=True)
-        try:
-            wait_until(self._answers)
-            wait_for_publisher_links(self._publisher, 1)
-        except AssertionError:
-            node.kill()
-            raise
-        return node
-
-    def _answers(self) -> bool:
-        try:
-            self._held()
-        except (rospy.ServiceException, OSError):
-            return False
-        return True
+        return started_core(self._namespace, [self._publisher], starter)
 
     def _held(self) -> Set[int]:
         """Return the numbers of the blocks that the node holds."""
-        cloud = rospy.ServiceProxy(self._get_region, GetRegion)(Point(-1, -1, -9), Point(1e4, 1, 9)).cloud
-        return _numbers(np.frombuffer(cloud.data, dtype=np.float32).reshape(-1, len(cloud.fields)))
+        return _numbers(held_points(self._namespace))
 
     def _saved(self) -> Set[int]:
         """Return the numbers of the blocks that the node's files hold."""

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import partial
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Set, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -83,6 +83,31 @@ class Mission:
     sonar_in_base: np.ndarray
 
 
+def started_core(
+    namespace: str, publishers: Sequence[rospy.Publisher], starter: Sequence[str] = (), names: Sequence[str] = ()
+) -> "subprocess.Popen[bytes]":
+    """Start mlsm_core in a namespace, and wait until it takes what `publishers` send, and answers.
+
+    starter: what the command begins with. names: remapped ones.
+    """
+    command = [*starter, str(PACKAGE_ROOT / "nodes/mlsm_core"), f"__ns:={namespace}", *names]
+    node = subprocess.Popen(command, start_new_session=True)
+    try:
+        for publisher in publishers:
+            wait_for_publisher_links(publisher, 1)
+        rospy.wait_for_service(f"{namespace}/mlsm_core/get_region", timeout=PATIENCE)
+    except (AssertionError, rospy.ROSException):
+        node.kill()
+        raise
+    return node
+
+
+def held_points(namespace: str) -> np.ndarray:
+    """Return the points (n, fields) of the map that a node holds."""
+    region = rospy.ServiceProxy(f"{namespace}/mlsm_core/get_region", GetRegion)
+    return rows(region(Point(-1e4, -1e4, -1e4), Point(1e4, 1e4, 1e4)).cloud)
+
+
 class ResumedVehicle:
     """Sends odometry and scans in the order of time, as fast as they are taken, to a node in a namespace of its own."""
 
@@ -131,16 +156,7 @@ class ResumedVehicle:
 
     def _started(self) -> "subprocess.Popen[bytes]":
         names = [f"/{name}:={self._namespace}/{name}" for name in ("tf", "tf_static")]
-        command = [str(PACKAGE_ROOT / "nodes/mlsm_core"), f"__ns:={self._namespace}", *names]
-        node = subprocess.Popen(command, start_new_session=True)
-        try:
-            for publisher in (self._tf, self._static, self._echoes):
-                wait_for_publisher_links(publisher, 1)
-            rospy.wait_for_service(self._get_region, timeout=PATIENCE)
-        except (AssertionError, rospy.ROSException):
-            node.kill()
-            raise
-        return node
+        return started_core(self._namespace, [self._tf, self._static, self._echoes], names=names)
 
     def _started_again(self, killed: float) -> Tuple["subprocess.Popen[bytes]", float, float]:
         """Start the node; return it, the share of the map that it kept, and the seconds that were lost.
@@ -154,17 +170,9 @@ class ResumedVehicle:
         unsaved = [came for end, came in self._fixed_at.items() if end > saved_until + ROUNDING]
         self._fixed_at.clear()
         saved = {tuple(cell) for cell in stored.shown.cells.tolist()}
-        kept = len(saved & self._held(stored.shown.resolution)) / len(saved)
+        held = cells_of(held_points(self._namespace).astype(np.float64), stored.shown.resolution)
+        kept = len(saved & {tuple(cell) for cell in held.tolist()}) / len(saved)
         return node, kept, killed - min(unsaved, default=killed)
-
-    def _held(self, resolution: float) -> Set[Tuple[int, int]]:
-        """Return the cells that the node's map holds."""
-        cloud = rospy.ServiceProxy(self._get_region, GetRegion)(Point(-1e4, -1e4, -1e4), Point(1e4, 1e4, 1e4)).cloud
-        return {tuple(cell) for cell in cells_of(rows(cloud).astype(np.float64), resolution).tolist()}
-
-    @property
-    def _get_region(self) -> str:
-        return f"{self._namespace}/mlsm_core/get_region"
 
     def _go(self, part: np.ndarray) -> None:
         """Send scans; those that end while no node listens are lost."""
