@@ -7,9 +7,9 @@ import unittest
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Point32, TransformStamped
+from geometry_msgs.msg import Point32
 from graph import Diagnostics, Inbox, end_publishing, run, wait_for_publisher_links
-from messages import publisher
+from messages import publisher, transform
 from sensor_msgs.msg import ChannelFloat32, JointState, LaserScan, PointCloud, PointCloud2, PointField
 from std_msgs.msg import Header, String
 
@@ -145,9 +145,7 @@ class GazeboSonar(unittest.TestCase):
         # The scan waits a few seconds for its transform, and a new connection may take as long on a busy machine.
         wait_for_publisher_links(transforms.pub_tf, 1)
         rays.publish(block_laser(header(start, "sonar_head"), BEAM, 5, WALL))
-        turned = TransformStamped(header=header(0.0, "sonar"), child_frame_id="sonar_head")
-        turned.transform.rotation.z, turned.transform.rotation.w = math.sin(-0.6), math.cos(-0.6)
-        transforms.sendTransform(turned)
+        transforms.sendTransform(transform("sonar", "sonar_head", yaw=-1.2))
         beam = self.turned.wait_for()
         self.assertAlmostEqual(beam.angle, -1.2, places=6)
         self.assertAlmostEqual(_strongest(beam), WALL, delta=0.5)

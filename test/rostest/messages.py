@@ -23,11 +23,14 @@ def publisher(topic: str, kind: type, listeners: int = 1) -> rospy.Publisher:
     return made
 
 
-def transform(parent: str, child: str, seconds: float = 0.0, x: float = 0.0) -> TransformStamped:
-    """Return a transform without rotation."""
+def transform(
+    parent: str, child: str, seconds: float = 0.0, x: float = 0.0, y: float = 0.0, yaw: float = 0.0
+) -> TransformStamped:
+    """Return a transform in the plane."""
     message = TransformStamped(child_frame_id=child)
     message.header.frame_id, message.header.stamp = parent, rospy.Time.from_sec(seconds)
-    message.transform.translation.x, message.transform.rotation.w = x, 1.0
+    message.transform.translation.x, message.transform.translation.y = x, y
+    message.transform.rotation.z, message.transform.rotation.w = math.sin(yaw / 2.0), math.cos(yaw / 2.0)
     return message
 
 

@@ -12,8 +12,9 @@ from typing import Any, Dict, List, Sequence, Tuple
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import Point, Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import Point
 from graph import PACKAGE_ROOT, PATIENCE, Diagnostics, Inbox, forget_links, rows, wait_for_publisher_links, wait_until
+from messages import transform
 from nav_msgs.msg import Odometry
 from tf2_msgs.msg import TFMessage
 
@@ -121,7 +122,7 @@ class ResumedVehicle:
         self._echoes = rospy.Publisher(f"{namespace}/sonar/scan/echoes", StampedIntensityCloud, queue_size=10)
         self._tf = rospy.Publisher(f"{namespace}/tf", TFMessage, queue_size=100)
         self._static = rospy.Publisher(f"{namespace}/tf_static", TFMessage, queue_size=1, latch=True)
-        self._mount = TFMessage([self._transform("base_link", "sonar", 0.0, np.append(mission.sonar_in_base, 0.0))])
+        self._mount = TFMessage([transform("base_link", "sonar", self._shift, *mission.sonar_in_base)])
         self._static.publish(self._mount)
         self._fixes = Inbox(f"{namespace}/MLSM/odometry", Odometry)
         self._diagnostics, self._scans_sent = Diagnostics(f"{namespace}/mlsm_core"), 0
@@ -195,24 +196,15 @@ class ResumedVehicle:
 
     def _cloud(self, scan: Scan) -> Cloud:
         stamps = np.where(scan.moving, 1.0, -1.0) * (scan.times + self._shift)
-        return Cloud(scan.points.astype(np.float32), stamps, self._stamp(scan.reference_time).to_nsec(), "odom")
+        end = rospy.Time.from_sec(scan.reference_time + self._shift)
+        return Cloud(scan.points.astype(np.float32), stamps, end.to_nsec(), "odom")
 
     def _send_odometry(self, until: float) -> None:
         track = self._mission.odometry
         first, last = np.searchsorted(track.times, [self._sent_until, until])
         known = zip(track.times[first:last], track.poses[first:last])
-        self._tf.publish([self._transform("odom", "base_link", time, pose) for time, pose in known])
+        self._tf.publish([transform("odom", "base_link", time + self._shift, *pose) for time, pose in known])
         self._sent_until = until
-
-    def _transform(self, parent: str, child: str, seconds: float, pose: np.ndarray) -> TransformStamped:
-        message = TransformStamped(child_frame_id=child)
-        message.header.frame_id, message.header.stamp = parent, self._stamp(seconds)
-        message.transform.translation = Vector3(pose[0], pose[1], 0.0)
-        message.transform.rotation = Quaternion(0.0, 0.0, np.sin(pose[2] / 2.0), np.cos(pose[2] / 2.0))
-        return message
-
-    def _stamp(self, seconds: float) -> rospy.Time:
-        return rospy.Time.from_sec(seconds + self._shift)
 
     def _fixed(self) -> Dict[float, Odometry]:
         """Return all fixes by the end of their scan [s]."""

@@ -182,11 +182,7 @@ class Trust(unittest.TestCase):
 
     @classmethod
     def odometry(cls) -> TransformStamped:
-        x, y, yaw = composed(cls.offset, truth(cls.seconds))
-        message = transform("odom", "base_link", cls.stamp(), x)
-        message.transform.translation.y = y
-        message.transform.rotation.z, message.transform.rotation.w = np.sin(yaw / 2.0), np.cos(yaw / 2.0)
-        return message
+        return transform("odom", "base_link", cls.stamp(), *composed(cls.offset, truth(cls.seconds)))
 
     @classmethod
     def stamp(cls) -> float:
