@@ -19,9 +19,9 @@ LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes
 
 
 class CourseFound(NamedTuple):
-    """turn: rad, counter-clockwise, of the sonar against the vehicle. deviation: rad.
+    """turn: rad, counter-clockwise, of the sonar against the vehicle. deviation: rad, infinite where none is told.
 
-    strafes: whether the vehicle was seen to have no usual course.
+    strafes: whether the vehicle was seen to have no usual course; the turn is that of its middle one then.
     """
 
     turn: float
@@ -70,7 +70,7 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
     if spread > _STRAFES or abs(middle) > largest:
-        return NOT_TOLD._replace(strafes=True)
+        return CourseFound(-middle, np.inf, strafes=True)
     deviation = 1.25 * spread / np.sqrt(_worth(wrapped(angles - middle), spread))
     return CourseFound(-middle, float(np.hypot(deviation, _AHEAD)))
 
@@ -90,8 +90,16 @@ def moves_are_turned(reported: Track, turn: float) -> bool:
 
     So it is if these go aside, by the odometry itself, about as far: most vehicles go where their heading points.
     """
-    aside = -course_of(reported, np.pi).turn
-    return bool(abs(wrapped(aside - turn)) < _ASIDE * abs(aside))
+    course = course_of(reported, np.pi)
+    return course.is_told and bool(abs(wrapped(course.turn + turn)) < _ASIDE * abs(course.turn))
+
+
+def is_reported(found: CourseFound, reported: Track) -> bool:
+    """Return whether the moves of the odometry go about as far aside as those that the echoes tell: a vehicle strafes
+    rather than that both sensors are turned by the same angle.
+    """
+    turn = course_of(reported).turn
+    return found.size >= _NAMED and bool(abs(wrapped(found.turn - turn)) < _ASIDE * abs(turn))
 
 
 def course_causes(found: CourseFound) -> List[Cause]:

@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, is_same
-from mlsm_manager.self_check.course import LARGEST, NOT_TOLD, CourseFound, course_causes, course_of
+from mlsm_manager.self_check.course import NOT_TOLD, CourseFound, course_causes, course_of, is_reported
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
 from node_support.geometry import move_of, rotated, transformed
@@ -70,8 +70,7 @@ class MotionFindings:
         """Return the findings with what T_map_base says of the sonar's mount."""
         if not self.is_told:
             return self
-        # Beside a compass alone nothing else tells a turn of the sonar, however large it is.
-        course, places = course_of(path, np.pi if self.is_alone else LARGEST), self.places
+        course, places = self._course_of(path), self.places
         # Where no course tells which of them is turned, it may be the sonar alone.
         direction = NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
@@ -82,6 +81,12 @@ class MotionFindings:
         causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
         return replace(self, causes=causes, apart=apart, course=course, mounts=mounts)
+
+    def _course_of(self, path: Track) -> CourseFound:
+        if self.is_alone:  # nothing else tells a turn of the sonar, however large it is
+            return course_of(path, np.pi)
+        course = course_of(path)
+        return course._replace(deviation=np.inf, strafes=True) if is_reported(course, self.track) else course
 
     def _late(self, places: np.ndarray) -> np.ndarray:
         """Return how far nodes at `places` (n, 2) [m] lie beside where they are by the sonar's clock, (n, 2) m.

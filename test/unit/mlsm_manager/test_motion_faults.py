@@ -16,7 +16,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.course import course_causes, course_of
+from mlsm_manager.self_check.course import course_causes, course_of, is_reported
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
 
@@ -222,6 +222,14 @@ def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_on
 def test_a_vehicle_that_goes_back_tells_nothing_of_the_mount_where_its_odometry_does():
     path = Track(WHOLE.track.times, WHOLE.track.poses + np.radians([0.0, 0.0, 180.0]))
     assert course_causes(course_of(path)) == []
+
+
+@pytest.mark.parametrize(("reported", "is_strafing"), [(-30.0, True), (-25.0, True), (0.0, False), (30.0, False)])
+def test_a_vehicle_strafes_where_its_odometry_says_so_as_well(reported, is_strafing):
+    ahead = WHOLE.track
+    path = Track(ahead.times, ahead.poses - np.radians([0.0, 0.0, -30.0]))
+    odometry = Track(ahead.times, ahead.poses - np.radians([0.0, 0.0, reported]))
+    assert is_reported(course_of(path), odometry) == is_strafing
 
 
 def test_a_vehicle_that_strafes_tells_nothing_of_the_mount():
