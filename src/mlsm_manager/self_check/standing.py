@@ -16,6 +16,8 @@ _CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose 
 _STRAIGHT = 2  # stretches of one heading, without positions: more are straight ways by a compass without noise
 _FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
 _AT_ONE_PLACE = 0.4  # times as far: simulated vehicles that stopped had .06 to .25, one that went along a wall .57
+_REST, _AT_REST = 10.0, 0.3  # s, and m within which a vehicle that rests stays meanwhile
+_PAUSE = 1.0  # s: longer than between two changes of a pose that is measured
 _SPEED = 0.3  # m/s: the usual speed of a small vehicle
 _ANY_TURN = np.pi / 2.0  # rad: the mean size of a turn that may be any
 
@@ -55,9 +57,26 @@ def _seems_frozen(track: Track, stretch: Tuple[int, int], within: np.ndarray, el
     """Return whether a pose that elsewhere trembles stands though scans do not show that the vehicle does.
 
     Along a straight wall they lie on each other wherever the vehicle goes. Where the stretch is too short for a pair of
-    scans, it must begin and end as suddenly as no vehicle stops.
+    scans, it must begin and end as suddenly as no vehicle stops. Where the pose trembles when the vehicle rests, it
+    need not: only at the beginning nobody may have measured it yet.
     """
+    if stretch[0] > 0 and _trembles_at_rest(track):
+        return True
     return _lie_apart(within, elsewhere, 1, _AT_ONE_PLACE) if len(within) else stands_suddenly(track, *stretch)
+
+
+def _trembles_at_rest(track: Track) -> bool:
+    """Return whether the pose goes on changing somewhere while the vehicle, of which positions tell, hardly moves."""
+    if not np.ptp(track.poses[:, :2], axis=0).any():
+        return False
+    changed = track.times[1:][(np.diff(track.poses, axis=0) != 0.0).any(axis=1)]
+    for begin in np.arange(track.times[0], track.times[-1] - _REST, _REST):
+        near = (track.times >= begin) & (track.times <= begin + _REST)
+        rests = np.hypot(*np.ptp(track.poses[near, :2], axis=0)) < _AT_REST
+        within = changed[(changed > begin) & (changed < begin + _REST)]
+        if rests and np.diff(within, prepend=begin, append=begin + _REST).max() < _PAUSE:
+            return True
+    return False
 
 
 def _lie_apart(within: np.ndarray, elsewhere: np.ndarray, fewest: int, share: float) -> bool:

@@ -172,6 +172,20 @@ def test_a_measured_pose_that_stands_is_named_frozen_unless_scans_show_that_the_
     assert [cause.begin for cause in found] == [40.0] * named
 
 
+@pytest.mark.parametrize(("begin", "trembles", "named"), [(60.0, True, True), (60.0, False, False), (0.0, True, False)])
+def test_a_pose_that_stands_is_named_frozen_where_it_trembles_at_another_rest(begin, trembles, named):
+    """It speeds up and slows down evenly between two rests of 20 s, in the one of which from `begin` on it stands."""
+    times = np.arange(0.0, 121.0, 0.1)
+    other = 60.0 - begin
+    rests = np.minimum(*(np.abs(times - rest - 10.0) - 10.0 for rest in (begin, other)))
+    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times))
+    stands = (times >= begin) & (times <= begin + 20.0)
+    measured = ~stands if trembles else rests > 0.0
+    places = 0.1 * np.cumsum(0.3 * np.clip(rests / 5.0, 0.0, 1.0))
+    track = Track(times, np.column_stack([places, 0.0 * times, noise * measured]))
+    assert [cause.begin for cause in standing_causes([], track, track.poses)] == [begin] * named
+
+
 def test_pairs_of_scans_that_reach_into_a_frozen_stretch_do_not_tell_how_far_apart_scans_usually_lie():
     """Four scans a metre apart while the odometry goes, six 1.5 m apart while it stands, and 4 m and more between."""
     times = np.arange(0.0, 101.0)
