@@ -12,6 +12,7 @@ _SECONDS, _GONE = 10.0, 1.0  # s of a stretch, and m in it from which on it has 
 _FEWEST = 10  # stretches
 _AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
 _STRAFES = np.radians(20.0)  # deviation of the course, beyond which the vehicle has no usual one; ahead: 5 to 13 deg
+_VAGUE = np.radians(5.0)  # deviation of the mean course: sonar and DVL are mounted by eye to 6 deg; a marina's: 4.8 deg
 _ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
 _NAMED = 2.0  # deviations
 _FAR = 3.0  # deviations: what goes farther aside counts as far
@@ -69,10 +70,9 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     middle = float(np.angle(np.exp(1j * angles).sum()))
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
-    if spread > _STRAFES or abs(middle) > largest:
-        return CourseFound(-middle, np.inf, strafes=True)
-    deviation = 1.25 * spread / np.sqrt(_worth(wrapped(angles - middle), spread))
-    return CourseFound(-middle, float(np.hypot(deviation, _AHEAD)))
+    deviation = np.hypot(1.25 * spread / np.sqrt(_worth(wrapped(angles - middle), spread)), _AHEAD)
+    strafes = spread > _STRAFES or deviation > _VAGUE or abs(middle) > largest
+    return CourseFound(-middle, np.inf if strafes else float(deviation), strafes)
 
 
 def _worth(aside: np.ndarray, spread: float) -> float:
