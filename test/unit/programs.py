@@ -11,6 +11,7 @@ from subprocess import CompletedProcess
 import pytest
 
 ROOT = Path(__file__).resolve().parents[2]
+BASIN = ROOT / "test/data/basin.bag"
 
 
 def run_program(name, *arguments, **variables):

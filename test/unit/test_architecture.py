@@ -6,13 +6,13 @@ Everything is derived from paths: what imports ROS stands in a folder `ros/` of 
 import ast
 import re
 from functools import lru_cache
-from pathlib import Path
 
 import pytest
+from programs import ROOT
 
 pytestmark = pytest.mark.newest_only("about the text of the sources")
 
-SOURCES = Path(__file__).resolve().parents[2] / "src"
+SOURCES = ROOT / "src"
 ALLOWED = {
     "node_support": set(),
     "autopilot_link": {"node_support", "sonar_driver"},

@@ -4,13 +4,11 @@ import os
 import re
 import shutil
 import subprocess
-from pathlib import Path
 from xml.etree import ElementTree as ET
 
 import pytest
 import yaml
-
-ROOT = Path(__file__).resolve().parents[2]
+from programs import ROOT
 
 
 def _rows(text):

@@ -2,12 +2,11 @@
 
 import re
 from importlib import import_module
-from pathlib import Path
 
 import pytest
+from programs import ROOT
 
 pytestmark = pytest.mark.newest_only("about the text of the documents")
-ROOT = Path(__file__).resolve().parents[2]
 DOCS = sorted((ROOT / "docs").glob("*.md"))
 PAGES = [ROOT / "README.md", ROOT / "migration" / "README.md", *DOCS]
 PAGES_BY_NAME = {path.relative_to(ROOT).as_posix(): path for path in PAGES}

@@ -5,13 +5,13 @@ Panels, keys and types of topics are those of the open Foxglove Studio 1.48 (MPL
 
 import json
 import re
-from pathlib import Path
 
 import pytest
+from programs import ROOT
 
 from node_support.node_table import DIAGNOSTICS, NODES, NodeDescription, Role
 
-LAYOUT = json.loads((Path(__file__).resolve().parents[2] / "rviz/foxglove_layout.json").read_text())
+LAYOUT = json.loads((ROOT / "rviz/foxglove_layout.json").read_text())
 PANELS = {name.partition("!")[0]: panel for name, panel in LAYOUT["configById"].items()}
 INTERFACES = [one for node in NODES.values() if isinstance(node, NodeDescription) for one in node.interfaces]
 KEYS = {

@@ -1,13 +1,12 @@
 """What `roslaunch --ros-args` tells of every launch file."""
 
-from pathlib import Path
-
 import pytest
+from programs import ROOT
 from roslaunch.arg_dump import get_args
 from roslaunch.config import load_config_default
 from roslaunch.core import RLException
 
-LAUNCH = Path(__file__).resolve().parents[2] / "launch"
+LAUNCH = ROOT / "launch"
 LAUNCH_FILES = sorted(LAUNCH.glob("*.launch"))
 REQUIRED = {"play_bag": {"bag"}}
 

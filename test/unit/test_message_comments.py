@@ -1,11 +1,10 @@
 """What people read who use a message without the code."""
 
 import re
-from pathlib import Path
 
 import pytest
+from programs import ROOT
 
-ROOT = Path(__file__).resolve().parents[2]
 MESSAGES = sorted([*ROOT.glob("msg/*.msg"), *ROOT.glob("srv/*.srv")])
 MEASURED = re.compile(r"(float\d\d|geometry_msgs/Point)\S* \w+")
 UNIT = re.compile(r"\[(m|s|rad)\b.*\]")

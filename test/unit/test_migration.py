@@ -2,7 +2,6 @@
 
 import re
 import subprocess
-from pathlib import Path
 
 import genpy
 import numpy as np
@@ -10,13 +9,13 @@ import pytest
 import rosbag
 from foreign_messages import serialised
 from old_bag import old_type
+from programs import ROOT
 
 from sonar_processing.ros.conversions import header, point_cloud
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 pytestmark = pytest.mark.newest_only("rosbag runs with ROS's own Python")
 
-ROOT = Path(__file__).resolve().parents[2]
 RULES = ROOT / "migration" / "avora_msgs.bmr"
 START = genpy.Time(1400000000, 123456789)
 

@@ -1,16 +1,14 @@
 """Files that are generated from the parameter dataclasses agree with them."""
 
 import importlib
-from pathlib import Path
 
 import pytest
 import yaml
 from document import LIVE_NODES, generated
+from programs import ROOT
 
 from node_support.node_table import NODES
 from node_support.parameters import config_name, describe
-
-ROOT = Path(__file__).resolve().parents[2]
 
 
 def test_generated_files_are_up_to_date():

@@ -2,9 +2,7 @@
 
 import json
 
-from programs import ROOT, run_program
-
-BASIN = ROOT / "test/data/basin.bag"
+from programs import run_program
 
 
 def run(*arguments):

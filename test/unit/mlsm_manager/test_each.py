@@ -5,12 +5,11 @@ import time
 from pathlib import Path
 
 import pytest
+from programs import ROOT
 
 from mlsm_manager.offline.each import INDEX, Cluster, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.index_page import Job, Outcome, Standing
 from recordings.bags.bag import RecordingError
-
-ROOT = Path(__file__).resolve().parents[3]
 
 
 def test_recordings_are_found_in_folders_and_nothing_else_is(tmp_path):

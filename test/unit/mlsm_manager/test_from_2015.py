@@ -3,11 +3,11 @@
 import argparse
 import dataclasses
 import re
-from pathlib import Path
 
 import pytest
 import yaml
 from document import LIVE_NODES
+from programs import ROOT
 from test_live_parameters import launched
 
 from mlsm_manager.migrate_yaml import NODES, migrated, migrated_text
@@ -16,7 +16,6 @@ from node_support.names_2015 import KEYS, NAMES, Kind
 from node_support.node_table import NODES as DESCRIBED
 from node_support.parameters import ParameterError, describe
 
-ROOT = Path(__file__).resolve().parents[3]
 FILES = {
     "MLSM_Core_default": {
         "cloudSubscribeTopic": "/sonar/scan/cleaned", "resolution": 0.6, "sizeXMeters": 120, "fastUpdate": False,

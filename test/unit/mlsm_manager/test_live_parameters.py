@@ -3,13 +3,13 @@
 import dataclasses
 from enum import Enum
 from functools import lru_cache
-from pathlib import Path
 
 import numpy as np
 import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from programs import ROOT
 from roslaunch.config import ROSLaunchConfig
 from roslaunch.xmlloader import XmlLoader
 
@@ -19,7 +19,6 @@ from mlsm_manager.offline.findings import Calibration
 from mlsm_manager.offline.replay import NODES, ReplayParameters, live_text, live_values, replay_values
 from node_support.parameters import ParameterError, describe
 
-ROOT = Path(__file__).resolve().parents[3]
 USED = ReplayParameters().changed(
     {"sonar_delay": 0.9, "range_scale": 0.97, "echo_deviation": 0.3, "estimator": "THESIS", "spacing": 0.7}
 )

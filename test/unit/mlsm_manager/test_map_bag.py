@@ -14,8 +14,8 @@ import pytest
 import rosbag
 import yaml
 from heading_only import reduce_bag
-from map_bag_runs import BASIN, refused, run, summary_of
-from programs import ROOT
+from map_bag_runs import refused, run, summary_of
+from programs import BASIN, ROOT
 
 from mlsm_manager.surface_map.map_file import Layer, read_map
 from recordings.bags.bag import Bag

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from made_recordings import scans_in
-from map_bag_runs import BASIN
+from programs import BASIN
 
 from mlsm_manager.offline.recording import read_recording
 from mlsm_manager.scan_matching.scan import Scan, Track

@@ -1,17 +1,15 @@
 """yaml/thesis.yaml: everything as the thesis of 2015 has it, live and in map_bag."""
 
-from pathlib import Path
-
 import pytest
 import yaml
 from document import LIVE_NODES
+from programs import ROOT
 from test_live_parameters import launched
 
 from mlsm_manager.offline.map_bag import map_bag, map_bag_arguments
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
 from sonar_simulator.simulation.simulation import GROUPS
 
-ROOT = Path(__file__).resolve().parents[3]
 TEXT = (ROOT / "yaml/thesis.yaml").read_text()
 THESIS = yaml.safe_load(TEXT)
 

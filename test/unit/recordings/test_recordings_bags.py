@@ -12,13 +12,13 @@ from hypothesis import given
 from hypothesis import strategies as st
 from made_bags import write_mcap, write_ros1_bag, write_sqlite_bag
 from old_bag import with_old_types
+from programs import BASIN
 
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import Bag, RecordingError
 from recordings.bags.writers import COMPRESSIONS, BagWriter
 from recordings.reader import Request
 
-BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 NAMES = Request(truth="/ground_truth")
 
 

@@ -1,11 +1,10 @@
 """--inspect says what a foreign bag holds, what is assumed and what is missing; convert_bag makes one of ours of it."""
 
-from pathlib import Path
-
 import foreign_bag as foreign
 import numpy as np
 import pytest
 from made_bags import write_mcap
+from programs import BASIN
 
 from mlsm_manager.offline.recording import read_recording
 from recordings.bags.bag import RecordingError
@@ -14,8 +13,6 @@ from recordings.bags.topic_roles import Role
 from recordings.convert_bag import convert_bag
 from recordings.reader import Request
 from recordings.survey import report, survey
-
-BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 
 
 @pytest.fixture

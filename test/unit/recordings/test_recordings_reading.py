@@ -1,11 +1,11 @@
 """The motion is found wherever a recording has it, and what is missing is said at once."""
 
 from functools import partial
-from pathlib import Path
 
 import foreign_bag as foreign
 import numpy as np
 import pytest
+from programs import BASIN
 
 from imagenex_852_driver.log_file import LoggedPing, LogWriter
 from imagenex_852_driver.reply import Reply, ReplyKind
@@ -16,7 +16,6 @@ from recordings.motion.vehicle_motion import MotionNames, MotionSource
 from recordings.reader import ReadingParameters, Request, read
 from recordings.survey import report, survey
 
-BASIN = Path(__file__).resolve().parents[2] / "data/basin.bag"
 LOCAL_POSITION = "/mavros/local_position/pose"
 CSV = "time,x,y,yaw\n100,0,0,0\n105,2.5,0,0\n110,5,0,0\n"
 COMPASS = CSV.replace("yaw", "Heading_deg").replace(",0\n", ",90\n")

@@ -1,13 +1,13 @@
 """Messages of several sonars become the same beams; damaged ones crash nothing, and each is counted."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from fuzzed_beams import fuzz
 from hypothesis import given
 from hypothesis import strategies as st
+from programs import ROOT
 from sonar_messages import (
     SECOND,
     STAMP_NS,
@@ -41,7 +41,7 @@ MADE = {
     RAW: raw_sonar_image_of,
     PROJECTED: projected_sonar_image_of,
 }
-SONARS_PAGE = (Path(__file__).resolve().parents[3] / "docs/sonars.md").read_text()
+SONARS_PAGE = (ROOT / "docs/sonars.md").read_text()
 NEEDED = {
     OWN: "header angle intensities maxrange_meters range_resolution sensorAngle",
     ECHO: "header angle intensities range number_of_samples speed_of_sound",

@@ -1,6 +1,5 @@
 import math
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ import yaml
 from sonar_simulator.simulation.scripted_vehicle import load_script
 from sonar_simulator.simulation.simulate_bag import run_simulate_bag
 
-ROOT = Path(__file__).resolve().parents[3]
 SCRIPT = "moves: [{wait: 1}, {x: 2, y: 1, yaw_deg: 40, seconds: 4}, {tilt_deg: 20}, {wait: 1}]"
 QUICK = ["--set", "sonar.ray_rows=5", "--set", "sonar.ray_columns=2", "--quiet"]
 

@@ -1,13 +1,13 @@
 """Full scans begin with the nearest surface, as least distance programming finds it."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from least_distance import nearest_range
+from programs import ROOT
 
 from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer, head_turns
@@ -20,7 +20,7 @@ from sonar_simulator.world.world_file import load_world
 
 pytestmark = pytest.mark.long
 
-WORLDS = Path(__file__).resolve().parents[3] / "worlds"
+WORLDS = ROOT / "worlds"
 NOISE_FREE = {
     "laser_cone": {"spread": 0.0, "noise_echoes": 0},
     "collision": {"spread": 0.0, "noise_echoes": 0, "increments": 0},

@@ -1,19 +1,19 @@
 """The mount of the sonar in a URDF, and its servo."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from programs import ROOT
 
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.simulation.robot import RobotDescription, Servo, ServoParameters, tilted
 
-CHARLE = RobotDescription((Path(__file__).resolve().parents[3] / "urdf/charle.urdf").read_text())
+CHARLE = RobotDescription((ROOT / "urdf/charle.urdf").read_text())
 CHAIN = """<robot name="r">
   <joint name="a" type="fixed"><parent link="base"/><child link="arm"/><origin xyz="1 0 0" rpy="0 0 1.5707963"/></joint>
   <joint name="b" type="revolute"><parent link="arm"/><child link="hand"/><origin xyz="2 0 0"/></joint>

@@ -1,12 +1,12 @@
 """Vehicles that follow scripts, and files of scripts."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from programs import ROOT
 
 from node_support.geometry import pose_matrix, yaw_of
 from node_support.parameters import ParameterError
@@ -98,7 +98,6 @@ def test_a_bad_entry_is_refused_with_its_number_key_and_what_is_allowed(moves, t
         VehicleScript.from_yaml_data(moves)
 
 
-ROOT = Path(__file__).resolve().parents[3]
 TOURS = {name: load_script(ROOT / "yaml" / f"{name}_tour.yaml") for name in ("basin", "harbour", "tank")}
 THESIS = load_script(ROOT / "yaml" / "thesis_moves.yaml")
 

@@ -1,19 +1,19 @@
 """SDF worlds: frames, shapes, and what is wrong with them."""
 
 import xml.etree.ElementTree as ET
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from programs import ROOT
 
 from node_support.geometry import pose_matrix
 from sonar_simulator.world.sdf_geometry import Scope, own_pose
 from sonar_simulator.world.world import WorldError
 from sonar_simulator.world.world_file import load_sdf
 
-BASIN = Path(__file__).resolve().parents[3] / "worlds" / "basin.sdf"
+BASIN = ROOT / "worlds" / "basin.sdf"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
 BALL = "<geometry><sphere><radius>0.5</radius></sphere></geometry>"
 

@@ -1,17 +1,17 @@
 """What an SDF world may hold beyond primitives: planes, meshes, included models, materials and colours."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from programs import ROOT
 
 from sonar_simulator.world.world import MATERIALS
 from sonar_simulator.world.world_file import load_sdf
 
-WORLDS = Path(__file__).resolve().parents[3] / "worlds"
+WORLDS = ROOT / "worlds"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
 LINK = f'<link name="l"><collision name="c">{BOX}</collision></link>'
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 1 4 3\nf 2 3 4\n"

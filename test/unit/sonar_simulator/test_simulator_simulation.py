@@ -1,15 +1,14 @@
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
+from programs import ROOT
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.simulation.robot import RobotDescription
 from sonar_simulator.simulation.simulation import Drive, Settings, make_setup
 
-ROOT = Path(__file__).resolve().parents[3]
 CHARLE = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
 QUICK = {"sonar": {"ray_rows": 5, "ray_columns": 3}}
 SCRIPT = """

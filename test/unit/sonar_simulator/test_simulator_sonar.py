@@ -2,11 +2,11 @@
 
 import math
 import sys
-from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from programs import ROOT
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
@@ -20,7 +20,7 @@ from sonar_simulator.world.world_file import load_sdf
 PATTERN = BeamPattern(math.radians(22.0), math.radians(2.5), 50, 10)
 HEAD = SonarHead(120, 16.0)
 TURN = np.array([HEAD.angle(beam) for beam in range(120)])
-BASIN_FILE = Path(__file__).resolve().parents[3] / "worlds" / "basin.sdf"
+BASIN_FILE = ROOT / "worlds" / "basin.sdf"
 BASIN = load_sdf(BASIN_FILE).world
 WALLS = World.from_shapes("walls", [shape for shape in BASIN.shapes if "wall" in shape.name])
 
