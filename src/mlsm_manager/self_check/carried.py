@@ -3,7 +3,7 @@
 Pairs of scans show it: those of a stretch lie on each other once each is moved by a velocity times its time.
 """
 
-from typing import List, NamedTuple, Optional, Tuple
+from typing import Dict, List, NamedTuple, Tuple
 
 import numpy as np
 
@@ -15,9 +15,10 @@ from node_support.geometry import grid
 _SPEEDS = np.arange(-0.6, 0.61, 0.15)  # m/s, along x and y: currents that a small vehicle is used in
 _STANDS = 0.01  # m/s: none
 _FINER = (0.05, 0.02)  # m/s
-_FARTHER = 1.3  # times as far as scans lie apart usually: less is no reason to look
 _SCANS = 12  # of a stretch: a current that is there for longer the solver finds
 _FEWEST = 3  # pairs
+_LEAST = -5.0  # nats: unbroken recordings show -5.5 and less, and a bottom that was lost -4.6 and more
+_MOST = 3  # stretches: pairs tell how long one is worse than a fit does
 
 
 class _Stretch(NamedTuple):
@@ -29,49 +30,48 @@ class _Stretch(NamedTuple):
     nats: float
 
 
-def carried(pairs: ScanPairs, base: Hypothesis) -> List[Cause]:
-    """Return when and how fast the vehicle was carried, if it was; base: what is right besides."""
+def carried(pairs: ScanPairs, base: Hypothesis, farther: float = 0.0) -> List[Cause]:
+    """Return when and how fast the vehicle may have been carried, the likeliest first.
+
+    base: what is right besides. farther: times as far as usual that the scans lie apart at least.
+    """
     near = pairs.near(base)
-    found = _likeliest(pairs, near, base)
-    if found is None or not np.isfinite(found.nats):
-        return []
+    likeliest = _likeliest(pairs, near, base, farther * float(np.median(near.distances)))
+    return [_cause(pairs, near, found, base) for found in likeliest if found.nats > _LEAST]
+
+
+def _cause(pairs: ScanPairs, near: NearPairs, found: _Stretch, base: Hypothesis) -> Cause:
     begin, end = near.middles[[found.first, found.last]]
     velocity = pairs.in_odometry(_refined(pairs, near, found, base), begin, base)
     fault = MotionFault(FaultKind.CARRIED, float(begin), tuple(velocity.tolist()), float(end))
     way = float(np.hypot(*velocity) * (end - begin))
-    return [Cause(fault.text, found.nats, fault.begin, metres=way, fault=fault)]
+    return Cause(fault.text, found.nats, fault.begin, metres=way, fault=fault)
 
 
-def _likeliest(pairs: ScanPairs, near: NearPairs, base: Hypothesis) -> Optional[_Stretch]:
-    """Return the likeliest stretch; its evidence is less by the logarithm of how many were tried."""
-    count, usual = len(near.middles), float(np.median(near.distances))
-    stretches = [(first, last) for first in range(count) for last in range(first + 2, min(count, first + _SCANS + 1))]
-    inside = {one: near.within(*one) for one in stretches}
-    inside = {
-        one: within
-        for one, within in inside.items()
-        if within.sum() >= _FEWEST and near.distances[within].mean() > _FARTHER * usual
-    }
-    if not inside:
-        return None
-    speeds = grid(_SPEEDS)
+def _likeliest(pairs: ScanPairs, near: NearPairs, base: Hypothesis, apart: float) -> List[_Stretch]:
+    """Return the likeliest stretches, each of another number of scans, which lie `apart` [m] or more; their evidence is
+    less by the logarithm of how many were tried.
+    """
+    count, speeds = len(near.middles), grid(_SPEEDS)
     speeds = speeds[np.hypot(*speeds.T) > _STANDS]
-    needed = np.any(list(inside.values()), axis=0)
-    table = np.full((len(speeds), len(needed)), np.nan)
-    table[:, needed] = pairs.carried(near.pairs[needed], speeds, base)
-    tried = np.log(len(stretches) * len(speeds))
-    return max((_judged(one, within, near, table, speeds, tried) for one, within in inside.items()), key=_nats)
+    stretches = [(first, last) for first in range(count) for last in range(first + 2, min(count, first + _SCANS + 1))]
+    table, tried = pairs.carried(near.pairs, speeds, base), np.log(len(stretches) * len(speeds))
+    best: Dict[int, _Stretch] = {}
+    for first, last in stretches:
+        within = near.within(first, last)
+        if min(within.sum(), (~within).sum()) >= _FEWEST and near.distances[within].mean() > apart:
+            found = _judged((first, last), within, near, table, speeds)
+            best[last - first] = max(best.get(last - first, found), found, key=_nats)
+    ordered = sorted(best.values(), key=_nats, reverse=True)[:_MOST]
+    return [found._replace(nats=found.nats - tried) for found in ordered]
 
 
 def _judged(
-    one: Tuple[int, int], within: np.ndarray, near: NearPairs, table: np.ndarray, speeds: np.ndarray, tried: float
-) -> _Stretch:
+    one: Tuple[int, int], within: np.ndarray, near: NearPairs, table: np.ndarray, speeds: np.ndarray
+) -> _Stretch:  # fmt: skip
     """Return the likeliest velocity of a stretch, `one` from scan to scan; table: distances by speed and pair."""
     row = int(table[:, within].mean(axis=1).argmin())
-    apart, alike = near.distances[within], near.distances[~within]
-    if len(alike) < _FEWEST:
-        return _Stretch(*one, speeds[row], -np.inf)
-    nats = evidence_of(apart, table[row, within], one[1] - one[0], alike) - tried
+    nats = evidence_of(near.distances[within], table[row, within], one[1] - one[0], near.distances[~within])
     return _Stretch(*one, speeds[row], nats)
 
 

@@ -21,6 +21,7 @@ _SWAPPED = np.radians(30.0)  # from 90 deg: a vehicle that goes ahead does not t
 _SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0, 4.0))]
 _RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-5.0, 6.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
+_CARRIED = 1.3  # times as far as usual: less is no reason to name a current by pairs alone
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
 _NATS_MIRRORED = 30.0  # by which it must be likelier: vehicles that go ahead show wrong ones by 7, others right by 60
 _SIDES = tuple(Hypothesis(is_over=is_over, mirrored=mirrored) for mirrored in Mirror for is_over in (False, True))
@@ -57,7 +58,7 @@ def echo_findings(
     if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
-    named = [cause for cause in carried(pairs, honest) if cause.evidence > NAMED_FROM]
+    named = [cause for cause in carried(pairs, honest, _CARRIED)[:1] if cause.evidence > NAMED_FROM]
     # A path that gave way to a current hides it: it is suspected of the odometry itself.
     suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
     found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
