@@ -139,7 +139,7 @@ def map_tool_arguments(arguments: List[str]) -> argparse.Namespace:
     out.add_argument("--overwrite", action="store_true", help="replace a file that exists")
     names = [by.value.lower() for by in ColorBy]
     colors.add_argument("--color", choices=names, default="height", help="what blocks are coloured by")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND")
+    commands = parser.add_subparsers(dest="command", metavar="|".join(_COMMANDS))
     commands.required = True
     info = commands.add_parser("info", help="say what maps hold")
     info.add_argument("maps", type=Path, nargs="+", metavar="FILE", help=_MAPS)
