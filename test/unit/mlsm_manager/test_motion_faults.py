@@ -207,6 +207,16 @@ def test_a_vehicle_strafes_only_where_it_was_seen_long_enough(stretches, strafes
     assert (found.is_told, found.strafes) == (False, strafes)
 
 
+@pytest.mark.parametrize(("seconds", "is_told"), [(50.0, False), (5.0, True)])
+def test_a_course_that_is_told_no_better_than_mounts_are_set_tells_nothing_of_the_mount(seconds, is_told):
+    """A vehicle that slips by up to 17 deg, every `seconds` to the other side."""
+    times = np.arange(0.0, 400.0)
+    course = np.radians(17.0) * np.sin(np.pi * times / seconds)
+    places = 0.5 * np.cumsum(np.column_stack([np.cos(course), np.sin(course)]), axis=0)
+    found = course_of(Track(times, np.column_stack([places, 0.0 * times])))
+    assert (found.is_told, found.strafes) == (is_told, not is_told)
+
+
 def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_once():
     lasting = np.repeat(np.radians([0.0, 9.0, -12.0, 4.0, 10.0, -7.0, -3.0]), 4)
     changing = lasting.reshape(7, 4).T.ravel()
