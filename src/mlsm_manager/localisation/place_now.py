@@ -43,9 +43,14 @@ class PlaceNow(NamedTuple):
         return float(np.sqrt(max(np.trace(self.covariance[POSITION, POSITION]), 0.0)))
 
     @property
+    def in_map(self) -> float:
+        """The deviation of the place in the map, m."""
+        return float(np.sqrt(max(self.deviation**2 - self.by_mounts**2, 0.0)))
+
+    @property
     def is_unknown(self) -> bool:
         """Whether the place in the map is known too badly to be told."""
-        return bool(self.deviation**2 - self.by_mounts**2 > LARGEST_DEVIATION**2)
+        return self.in_map > LARGEST_DEVIATION
 
 
 def doubts_of(
@@ -79,7 +84,7 @@ def position_state(
     if place is None:
         return PositionState.UNKNOWN, "; ".join(["no position yet", *doubts[:1]])
     if place.is_unknown:
-        return PositionState.UNKNOWN, "; ".join([f"position not known, {place.deviation:.1f} m", *doubts[:1]])
+        return PositionState.UNKNOWN, "; ".join([f"position not known, {place.in_map:.1f} m", *doubts[:1]])
     if doubts:
         return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
     if is_provisional:
@@ -105,5 +110,5 @@ def report_place(health: Health, place: PlaceNow) -> None:
         detail = f"the newest is {place.age:.0f} s old; does the sonar's head turn, and are echoes heard?"
         health.problem("seconds without a new fix", f"{detail} The position is known to {place.deviation:.1f} m")
     if place.is_unknown and place.fixes >= FEWEST_MATCHED:
-        detail = f"its deviation is {place.deviation:.1f} m, must be at most {LARGEST_DEVIATION:g} m"
+        detail = f"its deviation in the map is {place.in_map:.1f} m, must be at most {LARGEST_DEVIATION:g} m"
         health.problem("seconds in which the position is not known", detail, level=Level.ERROR)
