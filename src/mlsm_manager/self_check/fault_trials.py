@@ -33,6 +33,7 @@ _NATS = 5.0  # by which a run must fit better without a fault; by usual errors o
 _NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
 _NATS_CIRCLE = 20.0  # of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22
 _SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
+_SIZED = (FaultKind.CARRIED, FaultKind.RIGHT)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
 _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
@@ -170,6 +171,8 @@ def _is_missed_turn(fault: Fault, suspected: Sequence[Fault]) -> bool:
 def _beside(fault: Fault) -> List[Fault]:
     if fault.kind is FaultKind.STUCK:
         return [replace(fault, sizes=(fault.sizes[0] + turn,)) for turn in (-_TURNED / 3.0, _TURNED / 3.0)]
+    if fault.kind in _SIZED:
+        return []
     if not isinstance(fault, SonarFault):
         return [fault.times(factor) for factor in _LARGER]
     others = [fault.times(factor) for factor in _BESIDE]
