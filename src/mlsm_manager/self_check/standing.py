@@ -72,6 +72,8 @@ def _trembles_at_rest(track: Track) -> bool:
     changed = track.times[1:][(np.diff(track.poses, axis=0) != 0.0).any(axis=1)]
     for begin in np.arange(track.times[0], track.times[-1] - _REST, _REST):
         near = (track.times >= begin) & (track.times <= begin + _REST)
+        if not near.any():  # a step that was left out
+            continue
         rests = np.hypot(*np.ptp(track.poses[near, :2], axis=0)) < _AT_REST
         within = changed[(changed > begin) & (changed < begin + _REST)]
         if rests and np.diff(within, prepend=begin, append=begin + _REST).max() < _PAUSE:

@@ -160,6 +160,14 @@ def test_a_measured_pose_that_stands_is_named_frozen_where_no_scans_tell_if_it_s
     assert [cause.text for cause in standing_causes([], track, track.poses)] == ["odometry frozen for 20 s,"] * named
 
 
+def test_a_measured_pose_that_stands_is_named_frozen_where_poses_are_left_out_before():
+    """It goes until 60 s, without poses from 20 to 40 s, and stands suddenly."""
+    times = np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(40.0, 101.0, 0.1)])
+    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * (times < 60.0)
+    track = Track(times, np.column_stack([0.3 * np.minimum(times, 60.0), np.zeros(len(times)), noise]))
+    assert [cause.begin for cause in standing_causes([], track, track.poses)] == [pytest.approx(60.0, abs=0.2)]
+
+
 @pytest.mark.parametrize(("measured", "step", "named"), [(True, 0.7, True), (False, 0.7, False), (True, 0.1, False)])
 def test_a_measured_pose_that_stands_is_named_frozen_unless_scans_show_that_the_vehicle_stands(measured, step, named):
     """Four scans a metre apart while the odometry goes, six `step` [m] apart while it stands, as along a wall."""
