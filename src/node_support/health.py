@@ -10,6 +10,7 @@ from typing import Callable, Dict, Iterator
 from node_support.timing import UsualInterval
 
 SILENCE = 5.0  # s without a message, from which on a stage says that its input ceased
+_MISSING = 15.0  # s without a first message: programs that are started together begin within less
 WARNING_PERIOD = 10.0  # s: often enough to be seen in a log, seldom enough to leave the rest of it readable
 LONGEST_PERIOD = 60.0  # s: of warnings of what goes on, so that a log of days can be read
 
@@ -38,6 +39,7 @@ class _Input:
         self._usual = UsualInterval()
         self._newest = now
         self._is_expected = is_expected
+        self._next_warning = _MISSING
 
     def take(self, now: float) -> None:
         self._usual.take(now)
@@ -50,6 +52,14 @@ class _Input:
         """
         seconds = now - self._newest
         return seconds if seconds > SILENCE and (self._is_expected or self._usual.overdue(now) > 0.0) else 0.0
+
+    def missed(self, now: float) -> float:
+        """Return for how long [s] nothing ever came that is expected, each time that it doubled; 0 in between."""
+        seconds = self.silence(now) if self._is_expected else 0.0
+        if seconds < self._next_warning:
+            return 0.0
+        self._next_warning = 2.0 * seconds
+        return seconds
 
 
 class _Problem:
@@ -100,7 +110,7 @@ class Health:
             self._inputs.setdefault(topic, _Input(now)).take(now)
 
     def expect(self, topic: str) -> None:
-        """Say it, too, when nothing ever comes on a topic."""
+        """Say it, too, and warn, when nothing ever comes on a topic."""
         with self._lock:
             self._inputs[topic] = _Input(self._clock(), True)
 
@@ -167,6 +177,7 @@ class Health:
 
     def report(self) -> HealthReport:
         """Return the state since the start, with rates since the previous report."""
+        self._warn_of_missed()
         with self._lock:
             now = self._clock()
             values = self._counter_values(max(now - self._last_report, 1e-9))
@@ -182,6 +193,14 @@ class Health:
         ceased = {f"nothing on {topic} for {seconds:.0f} s": Level.WARN for topic, seconds in self.silent().items()}
         recent = {**ceased, **recent}
         return HealthReport(max(recent.values(), default=Level.OK), "; ".join(recent) or "running", values)
+
+    def _warn_of_missed(self) -> None:
+        with self._lock:
+            now = self._clock()
+            missed = {topic: one.missed(now) for topic, one in self._inputs.items()}
+        for topic, seconds in missed.items():
+            if seconds:
+                self._warn(f"{self.name}: nothing came on {topic} for {seconds:.0f} s: does anybody publish it?")
 
     def _counter_values(self, seconds: float) -> Dict[str, str]:
         values = {}

@@ -93,8 +93,7 @@ class StatusTeller:
         doubts = doubts_of(place, causes, self.verdicts, silent, self._odometry.name)
         state, text = position_state(place, self._localiser.is_lost, self.is_provisional, doubts)
         self._health.show("position", text)
-        if T_map_base is not None:
-            self._publish(state, text, place, T_map_base)
+        self._publish(state, text, place, T_map_base)
 
     def _look(self) -> None:
         """Look for causes, for no more than a small share of the time: other nodes need the core, too."""
@@ -116,7 +115,9 @@ class StatusTeller:
         T_map_base = matrices(self._transform.newest) @ T_odom_base
         return self._localiser.place_now(time, planar(T_odom_base)), T_map_base
 
-    def _publish(self, state: PositionState, text: str, place: Optional[PlaceNow], T_map_base: np.ndarray) -> None:
+    def _publish(
+        self, state: PositionState, text: str, place: Optional[PlaceNow], T_map_base: Optional[np.ndarray]
+    ) -> None:  # fmt: skip
         time = rospy.Time.now().to_sec() if place is None else place.time
         status = PositionStatus(header=header(round(time * 1e9), self._map_frame), state=state, text=text)
         status.age = np.nan if place is None else place.age
@@ -127,7 +128,7 @@ class StatusTeller:
             told.pose.pose, told.pose.covariance = pose_from_matrix(T_map_base), pose_covariance(place.covariance)
             self._pose.publish(told)
             self._chart.tell(place, planar(T_map_base), state)
-        if self._markers.get_num_connections():
+        if T_map_base is not None and self._markers.get_num_connections():
             letter = self._letter or _MOST
             self._markers.publish(MarkerArray(status_markers(status, T_map_base, letter, self._map_frame)))
 

@@ -163,3 +163,15 @@ def silent(stage, *, came, now, expected=False):
 def test_an_input_that_ceased_is_named_with_its_topic(stage, came, now, expected, seconds):
     told = (Level.OK, "running") if seconds is None else (Level.WARN, f"nothing on /heading for {seconds} s")
     assert silent(stage, came=came, now=now, expected=expected) == told
+
+
+def test_an_input_that_never_came_is_warned_of_each_time_that_the_silence_doubled(stage):
+    stage.now = 0.0
+    stage.health.expect("/heading")
+    for stage.now in range(1, 40):
+        stage.health.report()
+    stage.health.heard("/heading")
+    stage.now = 100.0
+    stage.health.report()
+    told = "thresholder: nothing came on /heading for {} s: does anybody publish it?"
+    assert stage.warnings == [told.format(15), told.format(30)]
