@@ -49,12 +49,16 @@ class Trust(unittest.TestCase):
         cls.seen = publisher("/initialpose", PoseWithCovarianceStamped)
         for inbox in (cls.fixes, cls.now, cls.corrections, cls.status, cls.charted):
             inbox.wait_for_link()
+        cls.first_status = cls.status.wait_for()
         cls.send_odometry()
         for _ in range(2):
             cls.turn_of_the_head()
         cls.fixes.wait_for_number(1)
         for _ in range(4):
             cls.turn_of_the_head()
+
+    def test_the_status_is_told_before_any_odometry(self) -> None:
+        self.assertEqual((self.first_status.state, self.first_status.text), (PositionStatus.UNKNOWN, "no position yet"))
 
     def test_0_fixes_of_satellites_put_the_vehicle_on_the_chart(self) -> None:
         for is_late in (False, True):

@@ -24,7 +24,8 @@ class OdometryTrack:
         self.name = f"tf of {odom_frame} -> {base_frame}"
         """As which its silence is told."""
         self._health = health
-        self._newest_ns = 0
+        self._newest_ns: Optional[int] = None
+        health.expect(self.name)
         self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, parent=odom_frame)
 
     def check_stamp(self, stamp_ns: int) -> None:

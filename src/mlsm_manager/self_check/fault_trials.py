@@ -194,8 +194,12 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     fit = fit_turned(run, track) if turns else fit_with(run, track, span)
     run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
     needed = _NATS_TURNED if fault.kind is FaultKind.STUCK and fault.sizes[0] else 0.0
-    needed += _of_more(found, run, fit, fault.begin) if fault.kind in OF_DISTANCES else 0.0
-    return _Trial(fault, run, fit, track, fit.log_likelihood - found.fit.log_likelihood - needed)
+    gain = fit.log_likelihood - found.fit.log_likelihood - needed
+    if fault.kind in OF_DISTANCES or fault.kind is FaultKind.CARRIED:
+        more = _of_more(found, run, fit, fault.begin)
+        # Scans that a current took apart meet once it is known; they count where those that met before speak for it, too.
+        gain -= more if fault.kind in OF_DISTANCES or gain < more else 0.0
+    return _Trial(fault, run, fit, track, gain)
 
 
 def _of_more(found: MotionFindings, run: Solution, fit: BatchResult, begin: float) -> float:
