@@ -9,9 +9,14 @@ import pytest
 from benchmarks.fault_makers import range_told
 from benchmarks.faults import shortened
 from benchmarks.harness import mapped_as
+from benchmarks.rare_faults import bottom_lost
 
-from mlsm_manager.offline.recording import read_recording
+from mlsm_manager.offline.recording import read_recording, scans_of
+from mlsm_manager.offline.replay import ReplayParameters
+from mlsm_manager.self_check.echo_causes import echo_findings
+from mlsm_manager.self_check.hypotheses import AS_TOLD
 from recordings.reader import Request
+from sonar_processing.filters.echo_extractor import EchoExtractor
 
 ROOT = Path(__file__).resolve().parents[2]
 
@@ -45,3 +50,10 @@ def test_nearly_all_scans_are_matched(marina):
 def test_a_range_setting_that_is_shortened_does_not_make_the_odometry_look_too_long(recording):
     whole = shortened(read_recording(recording("marina_first.bag"), Request()), 600.0)
     assert not mapped_as(range_told(whole, at=200.0, share=0.4), "--refine").findings.trust.causes
+
+
+def test_a_lost_bottom_does_not_make_the_odometry_look_mirrored(recording):
+    whole = shortened(read_recording(recording("marina_first.bag"), Request()), 330.0)
+    lost = bottom_lost(whole, at=200.0, seconds=100.0, speed=0.2)
+    scans = [scan for scan, _ in scans_of(lost, EchoExtractor(ReplayParameters().echoes()))]
+    assert echo_findings(scans, lost.sonar_in_base).mount == AS_TOLD

@@ -24,6 +24,9 @@ _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to 
 _CARRIED = 1.3  # times as far as usual: less is no reason to name a current by pairs alone
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
 _NATS_MIRRORED = 30.0  # by which it must be likelier: vehicles that go ahead show wrong ones by 7, others right by 60
+# nats for each scan by which it must be likelier than nothing if the simplest error is not: a bottom that was lost in a
+# marina showed wrong ones by .4, right ones had 1.3 and more.
+_EACH_SCAN = 1.0
 _SIDES = tuple(Hypothesis(is_over=is_over, mirrored=mirrored) for mirrored in Mirror for is_over in (False, True))
 _AS_TOLD = "the odometry is as the echoes tell it"
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
@@ -82,7 +85,9 @@ def _turned(pairs: ScanPairs, right: Hypothesis) -> Tuple[Hypothesis, float]:
     # The more causes are tried the likelier one fits by chance.
     nats = {one: pairs.evidence(one, right) - np.log(len(_SIDES) * len(angles)) for one in fine}
     alike = [one for one in fine if one == best or pairs.evidence(best, one) < _NATS_MIRRORED]
-    found = next((one for one in alike if nats[one] > NAMED_FROM), alike[0])
+    found, *others = alike
+    if nats[found] <= NAMED_FROM:
+        found = next((one for one in others if nats[one] > max(NAMED_FROM, _EACH_SCAN * pairs.scans)), found)
     return found, nats[found]
 
 

@@ -130,9 +130,14 @@ class ScanPairs:
             return self.best(around(AS_TOLD, "scale", _SCALES))
         return self.best([AS_TOLD, *around(Hypothesis(as_solved=True), "delay", _LATE)])
 
+    @property
+    def scans(self) -> int:
+        """How many scans begin a pair."""
+        return len(np.unique(self.times[:, 0]))
+
     def evidence(self, hypothesis: Hypothesis, other: Hypothesis) -> float:
         """Return what speaks for a hypothesis against another, nats."""
-        return evidence_of(self.distances(other), self.distances(hypothesis), len(np.unique(self.times[:, 0])))
+        return evidence_of(self.distances(other), self.distances(hypothesis), self.scans)
 
     def near(self, base: Hypothesis) -> "NearPairs":
         """Return all pairs of scans up to three apart, as they lie if `base` is right."""
