@@ -59,8 +59,8 @@ class Cluster:
         try:
             self._executor.shutdown(wait=False)
             self._client.close()
-        except (OSError, CancelledError):
-            pass  # the scheduler is lost
+        except (OSError, CancelledError, AttributeError):
+            pass  # the scheduler is lost; while Dask connects to it again, it calls one that it does not have
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> "Future[Any]":
         """Run a function of a module, by its name, on any worker."""
