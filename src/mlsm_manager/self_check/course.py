@@ -94,9 +94,10 @@ def moves_are_turned(reported: Track, turn: float) -> bool:
     return course.is_told and bool(abs(wrapped(course.turn + turn)) < _ASIDE * abs(course.turn))
 
 
-def is_reported(found: CourseFound, reported: Track) -> bool:
-    """Return whether the moves of the odometry go about as far aside as those that the echoes tell: a vehicle strafes
-    rather than that both sensors are turned by the same angle.
+def odometry_agrees(found: CourseFound, reported: Track) -> bool:
+    """Return whether an unusual course is about that of the odometry, too.
+
+    Then the vehicle strafes: that sonar and DVL are both turned by the same angle is less likely.
     """
     turn = course_of(reported).turn
     return found.size >= _NAMED and bool(abs(wrapped(found.turn - turn)) < _ASIDE * abs(turn))

@@ -197,7 +197,7 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     gain = fit.log_likelihood - found.fit.log_likelihood - needed
     if fault.kind in OF_DISTANCES or fault.kind is FaultKind.CARRIED:
         more = _of_more(found, run, fit, fault.begin)
-        # Scans that a current took apart meet once it is known, and count where those that met before speak for it.
+        # Pairs of scans that meet only with the current count if the pairs that met before speak for it, too.
         gain -= more if fault.kind in OF_DISTANCES or gain < more else 0.0
     return _Trial(fault, run, fit, track, gain)
 

@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, is_same
-from mlsm_manager.self_check.course import NOT_TOLD, CourseFound, course_causes, course_of, is_reported
+from mlsm_manager.self_check.course import NOT_TOLD, CourseFound, course_causes, course_of, odometry_agrees
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
 from node_support.geometry import move_of, rotated, transformed
@@ -86,7 +86,7 @@ class MotionFindings:
         if self.is_alone:  # nothing else tells a turn of the sonar, however large it is
             return course_of(path, np.pi)
         course = course_of(path)
-        return course._replace(deviation=np.inf, strafes=True) if is_reported(course, self.track) else course
+        return course._replace(deviation=np.inf, strafes=True) if odometry_agrees(course, self.track) else course
 
     def _late(self, places: np.ndarray) -> np.ndarray:
         """Return how far nodes at `places` (n, 2) [m] lie beside where they are by the sonar's clock, (n, 2) m.

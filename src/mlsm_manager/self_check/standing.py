@@ -57,8 +57,9 @@ def _seems_frozen(track: Track, stretch: Tuple[int, int], within: np.ndarray, el
     """Return whether a pose that elsewhere trembles stands though scans do not show that the vehicle does.
 
     Along a straight wall they lie on each other wherever the vehicle goes. Where the stretch is too short for a pair of
-    scans, it must begin and end as suddenly as no vehicle stops. Where the pose trembles when the vehicle rests, it
-    need not: only at the beginning nobody may have measured it yet.
+    scans, it must begin and end as suddenly as no vehicle stops. A pose that
+    trembles at another rest of the vehicle is frozen wherever it stands, but at the beginning: the odometry may not
+    have begun then.
     """
     if stretch[0] > 0 and _trembles_at_rest(track):
         return True
@@ -66,13 +67,13 @@ def _seems_frozen(track: Track, stretch: Tuple[int, int], within: np.ndarray, el
 
 
 def _trembles_at_rest(track: Track) -> bool:
-    """Return whether the pose goes on changing somewhere while the vehicle, of which positions tell, hardly moves."""
+    """Return whether the pose goes on changing somewhere at rest; False where no positions are reported."""
     if not np.ptp(track.poses[:, :2], axis=0).any():
         return False
     changed = track.times[1:][(np.diff(track.poses, axis=0) != 0.0).any(axis=1)]
     for begin in np.arange(track.times[0], track.times[-1] - _REST, _REST):
         near = (track.times >= begin) & (track.times <= begin + _REST)
-        if not near.any():  # a step that was left out
+        if not near.any():  # poses were left out there
             continue
         rests = np.hypot(*np.ptp(track.poses[near, :2], axis=0)) < _AT_REST
         within = changed[(changed > begin) & (changed < begin + _REST)]

@@ -16,7 +16,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.course import course_causes, course_of, is_reported
+from mlsm_manager.self_check.course import course_causes, course_of, odometry_agrees
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
 
@@ -239,7 +239,7 @@ def test_a_vehicle_strafes_where_its_odometry_says_so_as_well(reported, is_straf
     ahead = WHOLE.track
     path = Track(ahead.times, ahead.poses - np.radians([0.0, 0.0, -30.0]))
     odometry = Track(ahead.times, ahead.poses - np.radians([0.0, 0.0, reported]))
-    assert is_reported(course_of(path), odometry) == is_strafing
+    assert odometry_agrees(course_of(path), odometry) == is_strafing
 
 
 def test_a_vehicle_that_strafes_tells_nothing_of_the_mount():
