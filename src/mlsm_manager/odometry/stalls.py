@@ -92,7 +92,7 @@ def _held(track: Track, first: int, last: int, max_speed: float) -> Optional[Sta
     distance = float(np.hypot(*missed[:2]))
     if first == 0 or seconds >= _LONGEST_HELD or distance > max_speed * seconds:
         return None
-    is_right = distance > LEAST_STEP[0] or not np.ptp(poses[:, :2], axis=0).any()
+    is_right = distance > LEAST_STEP[0] or not track.reports_positions
     kind, lost = (StepKind.HELD, 0.0) if is_right else (StepKind.HUNG, seconds)
     return Stall(first, last + 1, missed, missed, kind, lost)
 

@@ -10,6 +10,8 @@ from mlsm_manager.surface_map.blocks import BlockSource
 from node_support.errors import RefusedInput
 from node_support.geometry import move_of, seen_from, transformed, wrapped
 
+_ROUNDING = 1e-6  # m
+
 
 @dataclass(frozen=True)
 class Track:
@@ -38,6 +40,11 @@ class Track:
     def chosen(self, rows: Union[slice, np.ndarray]) -> "Track":
         """Return the poses `rows`, a slice or (m,) bool."""
         return Track(self.times[rows], self.poses[rows], self.lost[rows])
+
+    @property
+    def reports_positions(self) -> bool:
+        """Whether positions change; a step that was taken out of some that never do leaves a rounding."""
+        return bool(np.ptp(self.poses[:, :2], axis=0).max() > _ROUNDING)
 
     def with_poses(self, poses: np.ndarray) -> "Track":
         """Return the track with other poses (m, 3)."""

@@ -53,7 +53,7 @@ def echo_findings(
     pairs = ScanPairs(scans, sonar_in_base, corrections)
     if not pairs.tell:
         return EchoFindings([], AS_TOLD)
-    if not _reports_positions(scans):
+    if not any(scan.track.reports_positions for scan in scans):
         return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
     honest = pairs.honest
     best, nats = _turned(pairs, pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)]))
@@ -66,10 +66,6 @@ def echo_findings(
     suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
     found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
     return EchoFindings(ranked(found), AS_TOLD, suspected)
-
-
-def _reports_positions(scans: Sequence[Scan]) -> bool:
-    return any(np.ptp(scan.track.poses[:, :2], axis=0).any() for scan in scans)
 
 
 def _turned(pairs: ScanPairs, right: Hypothesis) -> Tuple[Hypothesis, float]:

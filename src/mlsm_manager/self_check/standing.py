@@ -29,12 +29,11 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
     went by the solver.
     """
     stretches = list(standing_stretches(track))
-    reports_positions = bool(np.ptp(track.poses[:, :2], axis=0).any())
-    if not reports_positions:
+    if not track.reports_positions:
         stuck = stuck_headings(track.with_poses(np.column_stack([path[:, :2], track.poses[:, 2]])))
         if stuck:
             return [of_stuck(*one) for one in stuck]
-    if not stretches or (not reports_positions and len(stretches) > _STRAIGHT):
+    if not stretches or (not track.reports_positions and len(stretches) > _STRAIGHT):
         return []
     (times, apart), spans = _pairs(scans), track.times[np.array(stretches)]
     inside = [apart[(times[:, 0] >= begin) & (times[:, 1] <= end)] for begin, end in spans]
@@ -68,7 +67,7 @@ def _seems_frozen(track: Track, stretch: Tuple[int, int], within: np.ndarray, el
 
 def _trembles_at_rest(track: Track) -> bool:
     """Return whether the pose goes on changing somewhere at rest; False where no positions are reported."""
-    if not np.ptp(track.poses[:, :2], axis=0).any():
+    if not track.reports_positions:
         return False
     changed = track.times[1:][(np.diff(track.poses, axis=0) != 0.0).any(axis=1)]
     for begin in np.arange(track.times[0], track.times[-1] - _REST, _REST):

@@ -47,6 +47,14 @@ def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
     assert_ends_as_the_whole(mended, causes[0])
 
 
+def test_positions_that_never_change_but_jump_are_none_once_the_jump_is_left_out():
+    poses = WHOLE.track.poses * [0.0, 0.0, 1.0]
+    recording = broken.odometry_jumps(WHOLE.with_track(WHOLE.track.with_poses(poses)), MIDDLE, 40.9)
+    assert recording.track.reports_positions
+    mended, _ = with_odometry_mended(recording, LIMITS)
+    assert not mended.track.reports_positions
+
+
 @pytest.mark.parametrize("goes_on", [True, False])
 def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
     mended, causes = with_odometry_mended(broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on), LIMITS)
