@@ -69,7 +69,7 @@ def beams_of_bag(bag: Bag, topic: str, parameters: BeamMessageParameters) -> Rec
     moving_state, still = MovingState(), SonarToCloudParameters()
     velocities = bag.messages(_VELOCITY_TOPIC)
     velocity = next(velocities, None)
-    beams, moving, notes, refused, reason = [], [], [], 0, ""
+    beams, moving, notes, refused, reason = [], [], bag.notes, 0, ""
     for time, message in list(bag.messages(topic)):
         while velocity is not None and velocity[0] <= time:
             _take_velocity(moving_state, velocity[1])

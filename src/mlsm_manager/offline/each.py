@@ -110,7 +110,7 @@ def _look(folder: Path) -> Tuple[Dict[str, str], bool]:
 
 
 INDEX = "index.html"
-_SUFFIXES = (".bag", ".mcap", ".db3")
+_SUFFIXES = (".bag", ".active", ".mcap", ".db3")  # .bag.active: of a recording that nobody ended
 _METADATA = "metadata.yaml"  # of a ROS 2 folder
 _MESSAGES = "messages.txt"
 _SUMMARY = "summary.json"
