@@ -185,7 +185,7 @@ class _Batch:
         """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
         window = self._parameters
         for taken in range(1, window.batch_iterations + 1):
-            if self.step() < window.tolerance or self.step_deviations < window.stop_sigma:
+            if self.step() < window.tolerance or self._step_deviations < window.stop_sigma:
                 return taken, True
         return window.batch_iterations, False
 
@@ -212,6 +212,9 @@ class _Batch:
         newest = self._layout.node_start(self._layout.last)
         self._prior.add(equations, newest, self.state.nodes[-1], self._covariance)
         self._solution = solution_of(equations)
+        # Its length in its own standard deviations: sqrt(step^T information step).
+        length = np.sqrt(max(0.0, -equations.gradient @ self._solution.step))
+        self._step_deviations = float(length) / float(np.sqrt(len(self.state.nodes)))
 
     def log_likelihood(self, across: float = np.nan) -> float:
         """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""
@@ -246,11 +249,6 @@ class _Batch:
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
-
-    @property
-    def step_deviations(self) -> float:
-        """Root mean square over the nodes of the last step, in its standard deviations."""
-        return self._solution.step_deviations / float(np.sqrt(len(self.state.nodes)))
 
     def covariances(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""

@@ -61,15 +61,6 @@ class Neighbours:
         return shared_neighbours(*(np.ascontiguousarray(array) for array in arrays), self._groups, cut, TIE)
 
 
-def shares_of(distance: np.ndarray, nearest: np.ndarray) -> np.ndarray:
-    """Return which shares (k, n) of the comparison of a point its k candidates at `distance` (k, n) [m] have.
-
-    nearest: (n,) the least distance of each point. The shares add up to 1.
-    """
-    share = np.maximum(1.0 - (distance - nearest) / TIE, 0.0)
-    return share / share.sum(axis=0)
-
-
 def pairs_of(
     lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, parameters: SolverParameters
 ) -> Pairs:
@@ -81,13 +72,6 @@ def pairs_of(
     own, others = (Surfaces(np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
     limits = Limits(cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
     return weighed_pairs(lists.within(sources, targets, cut), own, others, limits)
-
-
-def faded(distance: np.ndarray, cosine: np.ndarray, cut: float, parameters: SolverParameters) -> np.ndarray:
-    """Return factors (m,) of pairs at `distance` (m,) [m] with `cosine` (m,) between normals: 0 where they drop out."""
-    return ramp(distance, cut, FADING * cut) * ramp(
-        cosine, parameters.min_cosine, parameters.min_cosine + COSINE_FADING
-    )
 
 
 def met_with(

@@ -11,7 +11,6 @@ from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, LiveSolver, name_of
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Fix
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -133,7 +132,7 @@ class Hypotheses:
 
     def _weigh(self) -> None:
         """Show the solver that the echoes speak for, and say how uncertain the other one makes it."""
-        self._dvl_lead = self._lead_of_dvl(self._unsure.told)
+        self._dvl_lead = self._unsure.odometry.mixture.rival_lead(self._unsure.told)
         is_dvl = self.shown is not self._unsure
         if self._dvl_lead < _DOUBTED if is_dvl else self._dvl_lead > _CLEAR:
             self.show_other()
@@ -155,7 +154,7 @@ class Hypotheses:
             return fits[0]
         fit, other = fits
         unsure = fit if self.shown is self._unsure else other
-        self._dvl_lead = self._lead_of_dvl(unsure.told)
+        self._dvl_lead = self._unsure.odometry.mixture.rival_lead(unsure.told)
         if self.lead < 0.0:
             self.show_other()
             fit, other = other, fit
@@ -172,9 +171,6 @@ class Hypotheses:
     @property
     def _unsure(self) -> LiveSolver:
         return self.other if self.shown.odometry.mixture is None else self.shown
-
-    def _lead_of_dvl(self, told: Gaussian) -> float:
-        return self._unsure.odometry.mixture.rival_lead(told)
 
     @property
     def _names(self) -> Tuple[str, str]:

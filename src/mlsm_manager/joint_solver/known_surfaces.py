@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.joint_solver.comparisons import faded, shares_of
+from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.surface_points import LEAST_REACH, surface_normals
+from mlsm_manager.joint_solver.surface_points import LEAST_REACH, ramp, surface_normals
 from mlsm_manager.surface_map.blocks import cell_keys, cells_of, keys_of
 
 _CANDIDATES = 3  # blocks that are looked at for each point: more than there usually are as near as the nearest one
@@ -75,14 +75,16 @@ class KnownSurfaces:
             return Pairs(nothing, nothing, np.empty(0)), self._points.selected(nothing)
         distance, index = self._tree.query(sources.places, k=_CANDIDATES, distance_upper_bound=cut)
         near = np.flatnonzero(np.isfinite(distance[:, 0]))
-        share = shares_of(distance[near].T, distance[near, 0]).T
+        share = np.maximum(1.0 - (distance[near] - distance[near, :1]) / TIE, 0.0)
+        share = (share.T / share.T.sum(axis=0)).T
         own, rank = np.nonzero(share)
         rows, distance, share = near[own], distance[near[own], rank], share[own, rank]
         targets = self._points.selected(index[rows, rank])
         cosine = np.einsum("na,na->n", sources.normals[rows], targets.normals)
         targets = replace(targets, normals=targets.normals * np.where(cosine < 0.0, -1.0, 1.0)[:, np.newaxis])
-        importance = share * faded(distance, np.abs(cosine), cut, parameters)
-        importance = importance * sources.qualities[rows] * targets.qualities
+        fading = ramp(distance, cut, FADING * cut)
+        fading = fading * ramp(np.abs(cosine), parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
+        importance = share * fading * sources.qualities[rows] * targets.qualities
         kept = importance > 0.0
         return Pairs(rows[kept], np.arange(int(kept.sum())), importance[kept]), targets.selected(kept)
 

@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_new
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, YAW, State
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.places import PlaceCandidate, put_newest, put_submap, silent_scans
+from mlsm_manager.joint_solver.places import PlaceCandidate, put_newest, put_submap, silent_before
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog, stacked, unstacked
 from mlsm_manager.joint_solver.solution import Fix, Fixes, Solution, Submaps
@@ -178,7 +178,7 @@ class LiveSolver:
         Raises RefusedInput, and stays as it is, where the fit has no finite solution.
         """
         scans, before, by_parts, loops = len(self.estimates), self.state.copy(), self._by_parts, self._loops
-        self._silent = silent_scans(self.log)
+        self._silent = silent_before(self.log, self.log.scan_count - 1)
         for _ in range(scans, self.log.scan_count):
             self.submaps.append()
         try:
@@ -218,7 +218,8 @@ class LiveSolver:
             if self.search.is_certain:
                 window = self._fitted()
         self.closed = None
-        if self._may_close:
+        # Parts of a turn hear too little for it, and some maps never move.
+        if self._parts == 1 and self._may_bend and not self.submaps.is_apart:
             window = self._closed(window)
         estimates, covariances = window.estimates(self._parts), window.covariances_of_oldest(self._parts)
         self._frozen = FrozenPlaces(
@@ -254,11 +255,6 @@ class LiveSolver:
         window = LiveWindow(self.solution, self.estimates, self._frozen.covariances, self._start)
         window.fit(bend)
         return window
-
-    @property
-    def _may_close(self) -> bool:
-        """Whether loops are looked for: not where parts of a turn hear too little, nor in a map that never moves."""
-        return self._parts == 1 and self._may_bend and not self.submaps.is_apart
 
     def _closed(self, window: LiveWindow) -> LiveWindow:
         """Return the problem with the path bent to a place heard before, if the run then fits better."""
@@ -296,15 +292,10 @@ class LiveSolver:
 
     def _search(self) -> None:
         """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin a submap."""
-        if self._parts > 1:
-            self._search_by_parts()
-            return
-        if len(self.estimates) > self._silent:
+        if self._parts == 1 and len(self.estimates) > self._silent:
             covariance = self.estimates[-1 - self._silent].own_covariance
             self.search = put_newest(self.solution, covariance, self._silent)
-
-    def _search_by_parts(self) -> None:
-        if self._by_parts is not None:
+        if self._parts > 1 and self._by_parts is not None:
             self._by_parts = self._by_parts.followed(self.log, self.parameters)
             starts_known = self._known is not None or self._start is not None
             placed = self._by_parts.placed(self.log, self.state.nodes, self.parameters, starts_known)

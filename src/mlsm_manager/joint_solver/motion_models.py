@@ -15,7 +15,6 @@ from mlsm_manager.joint_solver.prior_mixture import PriorMixture
 from mlsm_manager.scan_matching.scan import Fading
 
 FIXED_DEVIATION = 1e-4  # m, rad: a pose that is frozen
-HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 DRIFT_STATES = 5
 DRIFT_SCALE = 3  # row of a drift
 DIRECTION, SCALE, CURRENT_X, CURRENT_Y = 3, 4, 5, 6  # columns of the nodes, after x, y and yaw

@@ -39,20 +39,23 @@ class Layout:
     """Where the free unknowns stand: those of nodes `first` to `last` (both included), then those of the run.
 
     Nodes before `first` are frozen. Several of them share one group, whose pose stands after the free unknowns.
-    group_of_node: (first,) which one; -1 for a node that nothing depends on. run_start: place of the run's first
-    unknown. size: number of free unknowns.
+    group_of_node: (first,) which one; -1 for a node that nothing depends on.
     """
 
     first: int
     last: int
     width: int
     group_of_node: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
-    run_start: int = field(init=False)
-    size: int = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "run_start", self.width * (self.last - self.first + 1))
-        object.__setattr__(self, "size", self.run_start + RUN_COLUMNS)
+    @property
+    def run_start(self) -> int:
+        """Place of the run's first unknown."""
+        return self.width * (self.last - self.first + 1)
+
+    @property
+    def size(self) -> int:
+        """Number of free unknowns."""
+        return self.run_start + RUN_COLUMNS
 
     def node_start(self, node: np.ndarray) -> np.ndarray:
         """Return the place of the first column of each node."""
@@ -85,7 +88,7 @@ _MOST_DENSE = 5000
 took 0.6 s of CPU time, a sparse solution 3.4 s and 1.2 GB."""
 
 
-_HELD_DEVIATION = 1e-6  # stands for a deviation of zero
+HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 
 
 class Residuals(NamedTuple):
@@ -108,7 +111,7 @@ def prior_of(columns: np.ndarray, off: np.ndarray, deviation: np.ndarray, held: 
     """
     pairs = np.full((len(off), 2), -1)
     pairs[:, 0], pairs[: len(held), 1] = columns, held
-    return Residuals(pairs, np.tile([1.0, -1.0], (len(off), 1)), off, np.maximum(deviation, _HELD_DEVIATION) ** -2.0)
+    return Residuals(pairs, np.tile([1.0, -1.0], (len(off), 1)), off, np.maximum(deviation, HELD_DEVIATION) ** -2.0)
 
 
 class NormalEquations:
@@ -162,24 +165,18 @@ class NormalEquations:
         return (whole[: self.size, : self.size] + _REGULARISATION * scipy.sparse.eye(self.size)).tocsc()
 
 
-def step_deviations(gradient: np.ndarray, step: np.ndarray) -> float:
-    """Return how long a step (size,) is in its own standard deviations: sqrt(step^T information step)."""
-    return float(np.sqrt(max(0.0, -gradient @ step)))
-
-
 def solution_of(equations: NormalEquations) -> "Union[DenseSolution, SparseSolution]":
     """Return the solution, found in the way that is faster for its size."""
     return DenseSolution(equations) if equations.size <= _MOST_DENSE else SparseSolution(equations)
 
 
 class DenseSolution:
-    """Solves normal equations of bounded size, and tells covariances. step_deviations: see the function."""
+    """Solves normal equations of bounded size, and tells covariances."""
 
     def __init__(self, equations: NormalEquations) -> None:
         information, self._to_held = equations.dense()
         self._factor = scipy.linalg.cho_factor(information)
         self.step = -scipy.linalg.cho_solve(self._factor, equations.gradient)
-        self.step_deviations = step_deviations(equations.gradient, self.step)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the inverse of the information times `right` (size, k)."""
@@ -201,12 +198,11 @@ class DenseSolution:
 
 
 class SparseSolution:
-    """Solves normal equations of a whole run, and tells covariances. step_deviations: see the function."""
+    """Solves normal equations of a whole run, and tells covariances."""
 
     def __init__(self, equations: NormalEquations) -> None:
         self._factor = scipy.sparse.linalg.splu(equations.sparse())
         self.step = -self._factor.solve(equations.gradient)
-        self.step_deviations = step_deviations(equations.gradient, self.step)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the inverse of the information times `right` (size, k)."""

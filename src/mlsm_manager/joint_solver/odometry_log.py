@@ -1,6 +1,6 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, List, Tuple, Union
 
 import numpy as np
@@ -85,7 +85,7 @@ class Motion:
     """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
 
     held: (m,) s, for how long until then positions did not change at all while the heading did, or were lost: the
-    odometry told nothing, or the vehicle was at rest. positions: (m,) complex x + i y [m] in odom.
+    odometry told nothing, or the vehicle was at rest.
 
     "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
     """
@@ -94,10 +94,11 @@ class Motion:
     poses: np.ndarray
     ahead: np.ndarray
     held: np.ndarray
-    positions: np.ndarray = field(init=False)
 
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "positions", as_complex(self.poses))
+    @property
+    def positions(self) -> np.ndarray:
+        """(m,) complex x + i y [m] in odom."""
+        return as_complex(self.poses)
 
 
 class OdometryLog:

@@ -98,31 +98,16 @@ class SolverParameters(JointSolverParameters):
 
     range_scale_error: float = parameter(0.0, "true range over reported range, minus 1", low=-0.5, high=1.0)
     sonar_delay: float = parameter(0.0, "seconds by which a beam is later than its stamp", unit="s", low=-5.0, high=5.0)
-    beam_half_width: float = parameter(
-        0.06, "angle within which a beam may have heard a point: twice the half-power half width of common heads",
-        unit="rad", low=0.0, high=0.5,
-    )  # fmt: skip
-    cut: float = parameter(2.2, "points farther apart are not compared", unit="m", low=0.1, high=50.0)
-    wide_cut: float = parameter(4.0, "the cut that a new scan starts with", unit="m", low=0.1, high=50.0)
-    weight: float = parameter(
-        0.1, "weight of the comparison of two echoes: neighbours share errors, and an echo meets many scans", low=1e-4,
-        high=1.0,
-    )  # fmt: skip
-    min_cosine: float = parameter(
-        0.75, "least cosine between two normals, so that both sides of a wall stay apart", low=-1.0, high=0.99
-    )
-    frozen_scans: int = parameter(
-        80, "older scans that a scan is compared with, the nearest: more than see one place in a tour", low=1, high=1000
-    )
-    live_iterations: int = parameter(3, "Gauss-Newton steps per scan", low=1, high=50)
-    batch_iterations: int = parameter(25, "Gauss-Newton steps at most for a whole run", low=1, high=500)
-    tolerance: float = parameter(
-        0.01, "a step below this in the positions' mean square ends the iteration", unit="m", low=1e-9, high=1.0
-    )
-    kept_scans: int = parameter(
-        200, "newest scans of which all is kept; of older ones only what a scan may be compared with", low=200,
-        high=10**9,
-    )  # fmt: skip
+    beam_half_width: float = 0.06  # rad, within which a beam may have heard a point: twice the half-power half width
+    cut: float = 2.2  # m: points farther apart are not compared
+    wide_cut: float = 4.0  # m: the cut that a new scan starts with
+    weight: float = 0.1  # of the comparison of two echoes: neighbours share errors, and an echo meets many scans
+    min_cosine: float = 0.75  # least one between two normals, so that both sides of a wall stay apart
+    frozen_scans: int = 80  # older ones that a scan is compared with, the nearest: more than see one place in a tour
+    live_iterations: int = 3  # Gauss-Newton steps per scan
+    batch_iterations: int = 25  # Gauss-Newton steps at most for a whole run
+    tolerance: float = 0.01  # m: a step below this in the positions' mean square ends the iteration
+    kept_scans: int = 200  # newest ones of which all is kept; of older ones only what a scan may be compared with
     odometry: OdometryModel = field(default_factory=_none_given)
     node_search: Optional[NodeSearch] = None
 

@@ -169,10 +169,8 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     step = transition.step_covariance(covariance)
     if _KNOWN * widest(step[:2, :2]) < solution.parameters.cut:
         return newest
-    before, own = (
-        log.surfaces.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1),
-        log.surfaces.rows(last - 1, last),
-    )
+    before = log.surfaces.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1)
+    own = log.surfaces.rows(last - 1, last)
     if not len(before) or not len(own):
         return newest
     targets = solution.placed(log.surfaces.points(before))
@@ -180,11 +178,6 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     if np.sqrt(step[YAW, YAW]) > _KNOWN_TURN:
         state, step = search.turned(state, step)
     return search.beside(state, step, MOST_POINTS)[1]
-
-
-def silent_scans(log: RunLog) -> int:
-    """Return how many scans before the newest one heard too little to tell a place, one after the other."""
-    return _silent_before(log, log.scan_count - 1)
 
 
 def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
@@ -294,7 +287,7 @@ def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -
     return own
 
 
-def _silent_before(log: RunLog, scan: int) -> int:
+def silent_before(log: RunLog, scan: int) -> int:
     """Return how many scans before `scan` heard too little to tell a place, one after the other."""
     heard = np.flatnonzero(log.surfaces.counts[:scan] >= FEWEST_POINTS)
     return scan - 1 - int(heard[-1]) if len(heard) else scan
@@ -302,7 +295,7 @@ def _silent_before(log: RunLog, scan: int) -> int:
 
 def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
     """Return what share (k,) of their move the newest nodes go with the scans from `first` on: in a silence a part."""
-    silent = _silent_before(log, first)
+    silent = silent_before(log, first)
     times = log.node_times[first - silent :]
     return np.minimum((times[1:] - times[0]) / (times[silent] - times[0]), 1.0)
 

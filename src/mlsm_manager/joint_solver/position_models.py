@@ -12,14 +12,13 @@ from mlsm_manager.joint_solver.motion_models import (
     DIRECTION,
     DRIFT_STATES,
     FIXED_DEVIATION,
-    HELD_DEVIATION,
     SCALE,
     Compass,
     Drift,
     OdometryModel,
     changes_of,
 )
-from mlsm_manager.joint_solver.normal_equations import YAW, Residuals
+from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, YAW, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, product, stretched
 from mlsm_manager.joint_solver.prior_mixture import PriorComponent, PriorMixture
 

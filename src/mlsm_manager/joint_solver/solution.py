@@ -1,7 +1,7 @@
 """A run as far as it is solved: what was measured, the unknowns, and what follows from both."""
 
 from dataclasses import dataclass, field, replace
-from typing import Dict, List, Mapping, Optional, Protocol, Tuple
+from typing import Dict, List, Mapping, Optional, Tuple, Union
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from mlsm_manager.joint_solver.placement import NO_POINTS, PlacedPoints, path_ro
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.surface_points import SurfacePoints
+from mlsm_manager.scan_matching.scan import MapCloud, Scan
 from node_support.geometry import inverse, transformed
 
 _HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
@@ -143,13 +144,6 @@ class Fixes:
         return cls({int(node): Fix(place, information) for node, place, information in zip(*arrays)})
 
 
-class TimedPoints(Protocol):
-    """points: (n, >= 2) m in odom. times: (n,) s, when they were heard."""
-
-    points: np.ndarray
-    times: np.ndarray
-
-
 @dataclass(frozen=True)
 class Solution:
     """What is passed, solved, drawn, stored and judged.
@@ -204,7 +198,7 @@ class Solution:
         """Return where `nodes` (...) of the run are, (..., 2) m in map."""
         return self.log.node_poses(nodes)[..., :2] + self.state.nodes[nodes, :2]
 
-    def heard(self, cloud: TimedPoints) -> Tuple[np.ndarray, np.ndarray]:
+    def heard(self, cloud: Union[MapCloud, Scan]) -> Tuple[np.ndarray, np.ndarray]:
         """Return the points (n, >= 2) of a cloud in map, and where the sonar was when it heard each, (n, 2) m.
 
         Ranges and stamps are corrected as the run's unknowns say. Before the first node and after the last one the

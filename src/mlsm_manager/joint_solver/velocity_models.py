@@ -1,21 +1,20 @@
 """Motion models of vehicles that report no positions: their velocity is unknown, and goes on as vehicles do."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, Dict, Iterator, List
+from typing import Callable, Dict, Iterator, List, Optional
 
 import numpy as np
 
 from mlsm_manager.joint_solver.motion_models import (
     DRIFT_STATES,
     FIXED_DEVIATION,
-    HELD_DEVIATION,
     Change,
     Compass,
     Drift,
     OdometryModel,
     changes_of,
 )
-from mlsm_manager.joint_solver.normal_equations import YAW, Layout, Residuals
+from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, YAW, Layout, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
 from mlsm_manager.scan_matching.scan import Fading
 from node_support.geometry import harmonics
@@ -41,21 +40,12 @@ class Speeds:
 
 
 @dataclass(frozen=True)
-class HeadingOdometry:
-    """What is known of the motion of a vehicle that reports its heading only."""
-
-    speeds: Speeds
-    compass: Compass
-
-
-@dataclass(frozen=True)
-class UnaidedOdometry:
-    """What is known of the motion of a vehicle that reports nothing.
+class TurnRates:
+    """How a vehicle turns that reports nothing.
 
     turn_rate_deviation: rad/s. turn_rate_correlation_time: s. heading_walk: rad/sqrt(s), besides the turn rate.
     """
 
-    speeds: Speeds
     turn_rate_deviation: float
     turn_rate_correlation_time: float
     heading_walk: float
@@ -73,16 +63,15 @@ class HeadingFactors(OdometryModel):
     distance_deviation = np.inf
     position_walk = np.inf
 
-    def __init__(self, parameters: HeadingOdometry) -> None:
-        self._speeds, self.compass = parameters.speeds, parameters.compass
+    def __init__(self, speeds: Speeds, compass: Optional[Compass]) -> None:
+        self._speeds, self.compass = speeds, compass
 
     @property
     def freed(self) -> "HeadingFactors":
-        return HeadingFactors(HeadingOdometry(self._speeds, self.compass.freed))
+        return HeadingFactors(self._speeds, self.compass.freed)
 
     def stuck(self, begin: float, end: float) -> "HeadingFactors":
-        stuck = (*self.compass.stuck, (begin, end))
-        return HeadingFactors(HeadingOdometry(self._speeds, replace(self.compass, stuck=stuck)))
+        return HeadingFactors(self._speeds, replace(self.compass, stuck=(*self.compass.stuck, (begin, end))))
 
     def first_node(self) -> np.ndarray:
         return np.zeros(self.width)
@@ -137,9 +126,8 @@ class HeadingFactors(OdometryModel):
 
     def _kept(self, durations: np.ndarray) -> tuple:
         """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
-        return np.exp(-durations / self._speeds.speed_correlation_time), np.exp(
-            -durations / self._speeds.slip_correlation_time
-        )
+        times = self._speeds.speed_correlation_time, self._speeds.slip_correlation_time
+        return tuple(np.exp(-durations / time) for time in times)
 
     def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
         """Return how unknowns change from node to node that do not only walk."""
@@ -172,11 +160,9 @@ class HeadingFactors(OdometryModel):
     def _step_variance(self, durations: np.ndarray) -> np.ndarray:
         """Return the variances (n,) [m^2] of steps whose speeds at both ends are known, in each direction."""
         own = self._speeds
-        of_axes = (
-            _bridged(own.speed_deviation, own.speed_correlation_time, durations),
-            _bridged(own.slip_deviation, own.slip_correlation_time, durations),
-        )
-        return (of_axes[0] + of_axes[1]) / 2.0
+        ahead = _bridged(own.speed_deviation, own.speed_correlation_time, durations)
+        aside = _bridged(own.slip_deviation, own.slip_correlation_time, durations)
+        return (ahead + aside) / 2.0
 
 
 class UnaidedFactors(HeadingFactors):
@@ -184,13 +170,11 @@ class UnaidedFactors(HeadingFactors):
 
     width = 7
 
-    def __init__(self, parameters: UnaidedOdometry) -> None:
-        self._speeds, self._own = parameters.speeds, parameters
+    def __init__(self, speeds: Speeds, turn_rates: TurnRates) -> None:
+        super().__init__(speeds, None)
+        self._own = turn_rates
 
-    @property
-    def freed(self) -> None:
-        """There is no compass that could be wrong."""
-        return None
+    freed = None  # there is no compass that could be wrong
 
     def first_deviations(self) -> np.ndarray:
         """The first heading defines the map."""
@@ -231,10 +215,8 @@ class UnaidedFactors(HeadingFactors):
         places = np.array([self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE])
         one, half = np.ones(len(starts)), durations / 2.0
         residual = np.diff(nodes[:, YAW]) - half * (nodes[1:, TURN_RATE] + nodes[:-1, TURN_RATE])
-        short = own.turn_rate_deviation**2 * np.minimum(
-            durations**3 / (6.0 * own.turn_rate_correlation_time), durations**2
-        )
-        weight = 1.0 / (short + own.heading_walk**2 * durations)
+        short = np.minimum(durations**3 / (6.0 * own.turn_rate_correlation_time), durations**2)
+        weight = 1.0 / (own.turn_rate_deviation**2 * short + own.heading_walk**2 * durations)
         jacobian = np.column_stack([one, -one, -half, -half])
         turn = Residuals(starts[:, np.newaxis] + places, jacobian, residual, weight)
         return [*super().steps(starts, nodes, motion), turn]

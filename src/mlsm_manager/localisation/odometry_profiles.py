@@ -19,13 +19,7 @@ from mlsm_manager.joint_solver.position_models import (
     ThrusterOdometry,
     UnsureFactors,
 )
-from mlsm_manager.joint_solver.velocity_models import (
-    HeadingFactors,
-    HeadingOdometry,
-    Speeds,
-    UnaidedFactors,
-    UnaidedOdometry,
-)
+from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.files import package_folder
 from node_support.parameters import EXPERT, parameter, read_values
@@ -166,12 +160,12 @@ def _thrusters(own: OdometryChoice) -> OdometryModel:
 
 
 def _heading(own: OdometryChoice) -> OdometryModel:
-    return HeadingFactors(HeadingOdometry(_speeds(own), _compass(own)))
+    return HeadingFactors(_speeds(own), _compass(own))
 
 
 def _none(own: OdometryChoice) -> OdometryModel:
     deviation = max(own.turn_rate_deviation, 1e-5)
-    return UnaidedFactors(UnaidedOdometry(_speeds(own), deviation, own.turn_rate_correlation_time, _TURN_NOISE))
+    return UnaidedFactors(_speeds(own), TurnRates(deviation, own.turn_rate_correlation_time, _TURN_NOISE))
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {

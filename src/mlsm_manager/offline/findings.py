@@ -9,8 +9,7 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, Par
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns, expected_deviations
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
-from mlsm_manager.joint_solver.motion_models import HELD_DEVIATION
-from mlsm_manager.joint_solver.normal_equations import RUN_COLUMNS
+from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, RUN_COLUMNS
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.refinement import Refined

@@ -6,7 +6,8 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult
-from mlsm_manager.joint_solver.motion_models import DIRECTION, HELD_DEVIATION
+from mlsm_manager.joint_solver.motion_models import DIRECTION
+from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.scan_matching.scan import Scan, Track

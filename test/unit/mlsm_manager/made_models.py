@@ -13,13 +13,7 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.position_models import DvlFactors, DvlOdometry, ThrusterFactors, ThrusterOdometry
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.velocity_models import (
-    HeadingFactors,
-    HeadingOdometry,
-    Speeds,
-    UnaidedFactors,
-    UnaidedOdometry,
-)
+from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
 
 COMPASS = Compass(heading_deviation=0.01745, heading_correlation_time=300.0, heading_walk=0.00035)
 DVL_ODOMETRY = DvlOdometry(
@@ -35,8 +29,8 @@ SPEEDS = Speeds(
 )  # fmt: skip
 
 DVL, THRUSTERS = DvlFactors(DVL_ODOMETRY), ThrusterFactors(THRUSTER_ODOMETRY)
-HEADING = HeadingFactors(HeadingOdometry(SPEEDS, COMPASS))
-UNAIDED = UnaidedFactors(UnaidedOdometry(SPEEDS, 0.05, 10.0, 0.00035))
+HEADING = HeadingFactors(SPEEDS, COMPASS)
+UNAIDED = UnaidedFactors(SPEEDS, TurnRates(0.05, 10.0, 0.00035))
 
 
 def solver_parameters(**values):

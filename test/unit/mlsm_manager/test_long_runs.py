@@ -105,9 +105,7 @@ def round_and_round(times):
 def forgetful(monkeypatch):
     """Forget what is older than 30 scans, six scans at once."""
     monkeypatch.setattr(live_solver, "_FORGOTTEN_AT_ONCE", 6)
-    parameters = solver_parameters(free_scans=5, frozen_scans=10)
-    object.__setattr__(parameters, "kept_scans", 30)
-    return parameters
+    return solver_parameters(free_scans=5, frozen_scans=10, kept_scans=30)
 
 
 def test_a_run_that_forgets_is_followed_as_one_that_does_not(forgetful):
