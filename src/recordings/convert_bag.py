@@ -73,7 +73,9 @@ def write_converted(path: Path, content: Content, request: Request) -> None:
     """
     writer = McapWriter if path.suffix == _MCAP else BagWriter
     with whole_file(path) as temporary, writer(temporary) as bag:
-        messages = [*_beams(bag, content.recorded.beams), *_motion(bag, content, request), *_truth(bag, content)]
+        messages = [*_beams(bag, content.recorded.beams), *_motion(bag, content, request)]
+        if content.truth is not None:
+            messages += _odometry(bag, _TRUTH, content.truth, "map", "")
         messages.sort(key=lambda one: one[0])
         start, end = messages[0][0], messages[-1][0]
         if start < 0 or end > _LATEST_NS:
@@ -102,10 +104,6 @@ def _motion(bag: _Writer, content: Content, request: Request) -> Iterator[_Stamp
     odometry = tracks.get((names.odom_frame, names.base_frame))
     if odometry is not None and not odometry.is_fixed:
         yield from _odometry(bag, _ODOMETRY, odometry, names.odom_frame, names.base_frame)
-
-
-def _truth(bag: _Writer, content: Content) -> Iterator[_Stamped]:
-    return _odometry(bag, _TRUTH, content.truth, "map", "") if content.truth is not None else iter(())
 
 
 def _odometry(bag: _Writer, topic: str, track: PoseTrack, frame: str, child: str) -> Iterator[_Stamped]:

@@ -6,7 +6,6 @@ from typing import Callable, Dict, Iterator, List, Optional, Tuple
 
 import numpy as np
 
-from georeferencing.fixes import Fix
 from imagenex_852_driver.log_file import LogReader, timed
 from imagenex_852_driver.reply import head_angle as imagenex_angle
 from node_support.errors import RefusedInput
@@ -20,8 +19,7 @@ from ping360_driver.scan_command import head_angle as ping360_angle
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.motion_table import is_table, rows_of
-from recordings.motion.pose_track import PoseTrack
-from recordings.ping_viewer_next import head_beams, is_ping_viewer_next, vehicle_fixes, vehicle_headings
+from recordings.ping_viewer_next import head_beams, is_ping_viewer_next
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_fields import USUAL_SPEED_OF_SOUND
 
@@ -46,16 +44,6 @@ def makers_beams(path: Path) -> RecordedBeams:
     if reader is None:
         raise RecordingError(f"{path}: not a log of a known sonar: neither a .852 file nor a log of Ping Viewer")
     return reader(path)
-
-
-def makers_headings(path: Path) -> Optional[PoseTrack]:
-    """Return the vehicle's orientations, at the origin, of a log that holds some. Raises RecordingError."""
-    return vehicle_headings(path) if is_ping_viewer_next(path) else None
-
-
-def makers_fixes(path: Path) -> List[Fix]:
-    """Return the vehicle's places on the Earth of a log that holds some. Raises RecordingError."""
-    return vehicle_fixes(path) if is_ping_viewer_next(path) else []
 
 
 def _reader(path: Path) -> Optional[_Reader]:

@@ -68,10 +68,12 @@ def head_beams(path: Path) -> Tuple[List[Tuple[float, HeadBeam]], int, List[str]
 
 
 def vehicle_headings(path: Path) -> Optional[PoseTrack]:
-    """Return the vehicle's orientations, x north, y west, z up, at the origin; None where the file has none.
+    """Return the vehicle's orientations, x north, y west, z up, at the origin; None of a file without any.
 
     Raises RecordingError.
     """
+    if not is_ping_viewer_next(path):
+        return None
     stamps, rotations = [], []
     for _, time_ns, content in _messages(path, "VehicleData"):
         angles = [content.get(name) for name in ("roll", "pitch", "yaw")]
@@ -85,7 +87,9 @@ def vehicle_headings(path: Path) -> Optional[PoseTrack]:
 
 
 def vehicle_fixes(path: Path) -> List[Fix]:
-    """Return where the vehicle was while at the surface. Raises RecordingError."""
+    """Return where the vehicle was while at the surface; nothing of another file. Raises RecordingError."""
+    if not is_ping_viewer_next(path):
+        return []
     rows = []
     for _, time_ns, content in _messages(path, "VehicleData"):
         place = [content.get(name) for name in ("lat", "lon", "alt")]

@@ -11,7 +11,7 @@ import numpy as np
 from node_support.geometry import quaternion_of
 from recordings.bags.bag import Bag, RecordingError, missing_topic
 from recordings.beams import RecordedBeams, beam_topic, beams_of_bag
-from recordings.makers_logs import is_makers_log, makers_beams, makers_headings
+from recordings.makers_logs import is_makers_log, makers_beams
 from recordings.motion.autopilot_log import is_autopilot_log, motion_of_autopilot
 from recordings.motion.clock_offset import clock_offset
 from recordings.motion.frame_tree import FrameTree, frame_tree, pose_track
@@ -26,6 +26,7 @@ from recordings.motion.vehicle_motion import (
     motion_of_bag,
     unsaid_motion,
 )
+from recordings.ping_viewer_next import vehicle_headings
 from sonar_processing.beams.parameters import MountingParameters
 from sonar_processing.beams.reader import BeamMessageParameters
 
@@ -157,7 +158,7 @@ def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
         return motion_of_bag(bag, request.motion, request.truth)
     if request.motion.declared is not None:
         return declared_motion(FrameTree(), request.motion)
-    headings = makers_headings(path)
+    headings = vehicle_headings(path)
     if headings is not None:
         note = f"no odometry: {len(headings)} headings from {path.name}, the position is unknown"
         tree = linked(FrameTree(), replace(request.motion, z_is_down=False), headings)

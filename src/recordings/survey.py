@@ -5,7 +5,7 @@ import shlex
 from dataclasses import dataclass
 from itertools import groupby, islice
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Dict, List, Optional, Sequence
 
 import numpy as np
 from scipy.ndimage import median_filter
@@ -114,14 +114,10 @@ def _signs_of_z_down(bag: Bag, frames: List[str]) -> List[str]:
 
 def _gravity(bag: Bag, topic: str) -> Optional[float]:
     """Return what the z axis of an Imu feels on average, m/s^2; None for another type or without messages."""
-    found = [_felt(message) for _, message in islice(bag.messages(topic), _IMU_MESSAGES)]
-    known = [value for value in found if value is not None and np.isfinite(value)]
+    some = (message for _, message in islice(bag.messages(topic), _IMU_MESSAGES))
+    found = [one.linear_acceleration.z for one in some if hasattr(one, "linear_acceleration")]
+    known = [value for value in found if np.isfinite(value)]
     return float(np.mean(known)) if known else None
-
-
-def _felt(message: Any) -> Optional[float]:
-    acceleration = getattr(message, "linear_acceleration", None)
-    return None if acceleration is None else acceleration.z
 
 
 def report(survey: Survey, request: Request) -> str:

@@ -184,7 +184,7 @@ class KeyframeMap:
         keyframes = zip(*(np.split(each, ends[:-1]) for each in (points, together.times, origins)))
         self._free.look(self._map, list(keyframes), self._left_out)
         self._left_out = 0
-        self._overlay.hide(self._free.outworn(self._map))
+        self._overlay.hide(*self._free.outworn(self._map))
 
 
 class KeyframeMaps:

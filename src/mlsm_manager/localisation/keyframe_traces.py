@@ -114,15 +114,14 @@ class KeyframeCarving:
             self._looks[number] = _Look(points[number], self._carver.findings(surface_map, beams, points[number]))
         self._hit_cells, self._hit_by = _newest_hits(points, surface_map.resolution)
 
-    def outworn(self, surface_map: MultiLevelSurfaceMap) -> np.ndarray:
-        """Return the rows (n,) of blocks of the map that go if the moving keyframes are where they are thought to be.
+    def outworn(self, surface_map: MultiLevelSurfaceMap) -> Tuple[Blocks, np.ndarray]:
+        """Return blocks of the map that go if the moving keyframes are where they are thought to be, and their rows.
 
         A keyframe with a point in a cell ends the count of the crossings that older ones saw there.
         """
-        nothing = np.empty(0, dtype=np.int64)
         looks = [(number, look.findings) for number, look in enumerate(self._looks) if look is not None]
         if not looks:
-            return nothing
+            return Blocks.none(surface_map.resolution), np.empty(0, dtype=np.int64)
         crossed = Blocks.joined([findings.crossed for _, findings in looks])
         keys = crossed.keys
         beams = np.concatenate([findings.beams for _, findings in looks])
@@ -136,7 +135,8 @@ class KeyframeCarving:
         entry = order[entry]
         same = blocks.take(block).gaps(crossed, entry) <= 0.0
         more = np.bincount(block[same], weights=beams[entry[same]], minlength=len(blocks))
-        return rows[(more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)]
+        gone = (more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)
+        return blocks.take(gone), rows[gone]
 
     def _strayed(self, points: List[np.ndarray], resolution: float, most: int) -> List[int]:
         """Return the numbers of the keyframes to be looked at again, at most `most`."""

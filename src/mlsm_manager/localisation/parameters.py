@@ -86,13 +86,17 @@ class MapParameters(ParameterSet):
 class LocaliserParameters(
     ThesisMatcherParameters, EstimatorParameters, CarvingParameters, MapParameters, MotionLimits
 ):  # fmt: skip
-    """All that a localiser is made from."""
+    """All that a localiser is made from. What only the live node can set stands here as it is of a recording."""
+
+    start_matching = True
+    map_input = MapInput.MATCHED
+    size_x_meters = size_y_meters = 0.0
 
     def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
         """Return a localiser with an empty map; sonar_in_base: m, x y of the sonar in base_link."""
         settings = self.localiser_settings()
         estimator = self._build_estimator(settings.matcher, sonar_in_base)
-        estimator.matching = self.matches_from_start
+        estimator.matching = self.start_matching
         return Localiser(estimator, settings, self.part(MotionLimits))
 
     def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
@@ -121,9 +125,7 @@ class LocaliserParameters(
         return np.inf if measured or alone else self.rate_correlation_time * self.parts_per_turn
 
     def localiser_settings(self) -> LocaliserSettings:
-        return LocaliserSettings(
-            self.build_matcher(), self._searching(EVERYWHERE), self.blend_time, self.chosen_map_input
-        )
+        return LocaliserSettings(self.build_matcher(), self._searching(EVERYWHERE), self.blend_time, self.map_input)
 
     def build_matcher(self) -> Matcher:
         """Return what places a single scan: in JOINT only those that begin a run in a map."""
@@ -145,16 +147,8 @@ class LocaliserParameters(
         return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
 
     @property
-    def matches_from_start(self) -> bool:
-        return True
-
-    @property
-    def chosen_map_input(self) -> MapInput:
-        return MapInput.MATCHED
-
-    @property
     def expected_blocks(self) -> int:
-        return 0
+        return int(self.size_x_meters / self.resolution) * int(self.size_y_meters / self.resolution)
 
 
 @dataclass(frozen=True)
@@ -253,20 +247,8 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
         return AskedOrigin.parsed(self.origin) if self.origin else None
 
     @property
-    def matches_from_start(self) -> bool:
-        return self.start_matching
-
-    @property
     def calibration(self) -> Dict[str, Any]:
         """The parameters that a map's blocks depend on, by name, to be stored with it."""
         names = ("map_input", "match_input", "beam_width", "range_scale_deviation")
         values = self.to_mapping()
         return {name: values[name] for name in names}
-
-    @property
-    def chosen_map_input(self) -> MapInput:
-        return self.map_input
-
-    @property
-    def expected_blocks(self) -> int:
-        return int(self.size_x_meters / self.resolution) * int(self.size_y_meters / self.resolution)

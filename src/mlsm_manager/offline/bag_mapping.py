@@ -2,9 +2,10 @@
 
 import sys
 from argparse import Namespace
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import cycle
+from multiprocessing import cpu_count, get_context
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -18,11 +19,11 @@ from mlsm_manager.odometry.faults import Mirror
 from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings
-from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
+from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
-from mlsm_manager.offline.sessions import Session, executor_for, prepared
+from mlsm_manager.offline.sessions import Session, prepared
 from mlsm_manager.offline.suited_parameters import (
     OdometryFound,
     goes_astray,
@@ -318,9 +319,10 @@ def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Na
     if not bags:
         return []
     known = _stored(first, parameters)
-    with executor_for(len(bags)) as executor:
-        read = partial(read_recording, request=replace(options.request, truth=None))
-        waiting = [executor.submit(prepared, bag, read, parameters) for bag in bags]
+    # No fork: this process may have threads that hold locks.
+    with ProcessPoolExecutor(min(len(bags), cpu_count()), get_context("spawn")) as executor:
+        request = replace(options.request, truth=None)
+        waiting = [executor.submit(prepared, bag, request, parameters) for bag in bags]
         for bag, job in zip(bags, waiting):
             recording, scans = job.result()
             with _bar(len(scans), "scan", bag.name[:9]) as bar:

@@ -22,9 +22,10 @@ from node_support.errors import RefusedInput
 from node_support.files import write_whole
 from node_support.topics import CHART_POSITION
 from recordings.bags.bag import Bag, RecordingError
-from recordings.makers_logs import is_makers_log, makers_fixes
+from recordings.makers_logs import is_makers_log
 from recordings.motion.autopilot_log import fixes_of_autopilot, is_autopilot_log
 from recordings.motion.motion_table import is_table
+from recordings.ping_viewer_next import vehicle_fixes
 
 _TYPE = "sensor_msgs/NavSatFix"
 
@@ -37,7 +38,7 @@ def satellite_fixes(path: Path) -> List[Fix]:
     if is_autopilot_log(path):
         return fixes_of_autopilot(path)
     if is_makers_log(path):
-        return makers_fixes(path)
+        return vehicle_fixes(path)
     if is_table(path):
         return []
     fixes: List[Fix] = []

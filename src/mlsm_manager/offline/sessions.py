@@ -1,24 +1,21 @@
 """Further recordings of the same water: each starts in the map of those before, finds itself, and adds to it."""
 
-from concurrent.futures import Executor, ProcessPoolExecutor
 from dataclasses import dataclass
-from multiprocessing import cpu_count, get_context
 from pathlib import Path
-from typing import Callable, Dict, List, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
+from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
 from mlsm_manager.offline.replay import CORRECTED, Replayed, ReplayParameters
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
+from recordings.reader import Request
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _SHOWN_AFTER = 3.0
 """s after the end of a scan at which its correction is shown: it waits for odometry and is blended in."""
-Reader = Callable[[Path], Recording]
-"""Reads a recording; a function at the top of a module or a partial of one, so that other processes can call it."""
 
 
 @dataclass(frozen=True)
@@ -51,13 +48,8 @@ class Session:
         return accepted[0] if accepted else None
 
 
-def prepared(bag: Path, read: Reader, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
-    """Return the corrected recording and its scans. Raises RecordingError, and OSError, as `read` does."""
-    recording = read(bag).corrected(parameters.part(BeamCorrection))
+def prepared(bag: Path, request: Request, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
+    """Return the corrected recording and its scans. Raises RecordingError and OSError."""
+    recording = read_recording(bag, request).corrected(parameters.part(BeamCorrection))
     scans = scans_of(recording, EchoExtractor(parameters.echoes()))
     return recording, whole_turns(bag, len(recording.beams), scans)
-
-
-def executor_for(jobs: int) -> Executor:
-    # No fork: the parent may have threads that hold locks.
-    return ProcessPoolExecutor(max(min(jobs, cpu_count()), 1), get_context("spawn"))

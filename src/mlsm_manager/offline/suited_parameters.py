@@ -95,7 +95,8 @@ def odometry_of(recording: Recording, standing: bool = False) -> OdometryFound:
 
 def _without_motion(shifts: SweepShifts, standing: bool) -> OdometryFound:
     if standing:
-        doubt = f", but it seems to be {shifts.motion.value}: {shifts}" if shifts.motion.is_motion else ""
+        moves = shifts.motion in (SweepMotion.DRIFTING, SweepMotion.MOVING)
+        doubt = f", but it seems to be {shifts.motion.value}: {shifts}" if moves else ""
         return OdometryFound(OdometryKind.DVL, f"--standing says so{doubt}", SweepMotion.STILL, is_said=True)
     kind = OdometryKind.NONE if shifts.motion is SweepMotion.MOVING else OdometryKind.DVL
     return OdometryFound(kind, f"no position or heading changes, and {shifts}", shifts.motion)

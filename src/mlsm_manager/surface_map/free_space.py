@@ -195,9 +195,11 @@ class Carver:
         Return a report, and what was not known to be free.
         """
         findings = self.findings(occupied, beams, points)
-        removed = self.charge(occupied, findings)
+        occupied.count_crossings(findings.rows, findings.beams)
+        gone = self.is_outworn(findings.crossed, findings.crossed.crossed + findings.beams)
+        occupied.remove(findings.rows[gone])
         noted = note_free(free, findings.free)
-        return CarveReport(len(findings.free), len(findings.rows), removed), noted
+        return CarveReport(len(findings.free), len(findings.rows), int(np.count_nonzero(gone))), noted
 
     def findings(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> BeamFindings:
         """Return what a scan says whose points (n, >= 3) are in `occupied` already.
@@ -218,16 +220,6 @@ class Carver:
         crossed = np.flatnonzero(number)
         free = _free_blocks(paths.take(before), occupied.resolution)
         return BeamFindings(free, blocks.take(crossed), rows[crossed], number[crossed])
-
-    def charge(self, occupied: MultiLevelSurfaceMap, findings: BeamFindings) -> int:
-        """Count the crossings, remove the blocks with too many, and return how many these are.
-
-        `occupied` must be as it was when the findings were made.
-        """
-        occupied.count_crossings(findings.rows, findings.beams)
-        gone = self.is_outworn(findings.crossed, findings.crossed.crossed + findings.beams)
-        occupied.remove(findings.rows[gone])
-        return int(np.count_nonzero(gone))
 
     def is_outworn(self, blocks: Blocks, crossings: np.ndarray) -> np.ndarray:
         """Return (n,) which of the blocks must go after so many crossings (n,) in a row."""

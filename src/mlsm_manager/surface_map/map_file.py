@@ -79,11 +79,9 @@ class StoredMap:
         return self.layers.get(Layer.SHOWN, self.layers.get(Layer.MATCHED, Blocks.none(1.0)))
 
 
-def write_map(path: Path, stored: StoredMap) -> int:
-    """Write the map whole or not at all and return its bytes; raises OSError."""
-    data = map_bytes(stored)
-    write_whole(path, data)
-    return len(data)
+def write_map(path: Path, stored: StoredMap) -> None:
+    """Write the map whole or not at all; raises OSError."""
+    write_whole(path, map_bytes(stored))
 
 
 def read_map(path: Path) -> StoredMap:

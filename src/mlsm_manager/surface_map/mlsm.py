@@ -116,10 +116,6 @@ class MultiLevelSurfaceMap:
         near[owners // len(around)] = True
         return near
 
-    def at(self, rows: np.ndarray) -> Blocks:
-        """Return a copy of the blocks in `rows` (n,), which `find` named."""
-        return self._store.blocks(rows)
-
     def replace(self, parts: Sequence[Blocks]) -> None:
         """Forget all blocks, and insert those of all `parts`."""
         self.remove(self._store.rows_in_use)
@@ -208,9 +204,9 @@ class Overlay:
         self._remember(blocks.keys)
         self._map.insert_blocks(blocks)
 
-    def hide(self, rows: np.ndarray) -> None:
-        """Remove the blocks in `rows` (n,) of the map."""
-        self._remember(self._map.at(rows).keys)
+    def hide(self, blocks: Blocks, rows: np.ndarray) -> None:
+        """Remove blocks of the map, which are in `rows` (n,) of it."""
+        self._remember(blocks.keys)
         self._map.remove(rows)
 
     def take_off(self) -> None:

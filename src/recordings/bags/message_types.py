@@ -59,7 +59,7 @@ class StoreMessages(Messages):
     """Makes messages of the types of a store."""
 
     def __init__(self, store: Typestore) -> None:
-        super().__init__(lambda kind: blank_message(store, kind.replace("/", "/msg/")))
+        super().__init__(lambda kind: maker(store, kind.replace("/", "/msg/"))())
 
     def time(self, stamp_ns: int) -> Any:
         time = self.make("builtin_interfaces/Time")
@@ -67,14 +67,12 @@ class StoreMessages(Messages):
         return time
 
 
-def blank_message(store: Typestore, name: str) -> Any:
-    """Return a new message of a type, package/msg/Name. Raises KeyError for a type that the store does not know."""
-    return _maker(store, name)()
-
-
 @lru_cache(maxsize=None)
-def _maker(store: Typestore, name: str) -> Callable[[], Any]:
-    """Return what makes messages of a type; its definition is looked up once only."""
+def maker(store: Typestore, name: str) -> Callable[[], Any]:
+    """Return what makes new messages of a type, package/msg/Name; its definition is looked up once only.
+
+    Raises KeyError for a type that the store does not know.
+    """
     kind = store.types[name]
     makers = [_field_maker(store, field) for _, field in store.FIELDDEFS[name][1]]
     return lambda: kind(*[make() for make in makers])
@@ -86,7 +84,7 @@ def _field_maker(store: Typestore, kind: Any) -> Callable[[], Any]:
         name = detail[0]
         return str if name == "string" else bool if name == "bool" else float if name.startswith("float") else int
     if node == Nodetype.NAME:
-        return _maker(store, detail)
+        return maker(store, detail)
     (inner, inner_detail), length = detail
     count = length if node == Nodetype.ARRAY else 0
     if inner == Nodetype.BASE and inner_detail[0] != "string":

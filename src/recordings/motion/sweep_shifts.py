@@ -45,10 +45,6 @@ class SweepMotion(Enum):
     MOVING = "moving"
     UNTOLD = "not told"
 
-    @property
-    def is_motion(self) -> bool:
-        return self in (SweepMotion.DRIFTING, SweepMotion.MOVING)
-
 
 class _Apart(NamedTuple):
     """What was found of sectors so many `sweeps` later.
