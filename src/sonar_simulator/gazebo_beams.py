@@ -94,5 +94,4 @@ class GazeboBeams:
         return self._ping(angle, scan.rays.within(angle, opening))
 
     def _ping(self, angle: float, rays: Rays) -> Ping:
-        contacts = contacts_of_grid(rays.ranges, rays.elevations, rays.bearings, retro=rays.retro)
-        return Ping(angle, self._model.echoes(contacts, self._rng)[0])
+        return Ping(angle, self._model.echoes(contacts_of_grid(rays), self._rng)[0])

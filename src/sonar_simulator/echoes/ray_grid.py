@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass
-from typing import Optional, Tuple
+from typing import Any, Optional, Tuple
 
 import numpy as np
 
@@ -44,51 +44,41 @@ class Rays:
         return Rays(self.ranges[:, columns], self.elevations, off[columns], retro)
 
 
-@dataclass(frozen=True)
-class ScanLayout:
-    """The layout of a ray sensor in sensor_msgs/LaserScan: columns by its angles, row after row; m and rad."""
-
-    angle_min: float
-    angle_max: float
-    angle_increment: float
-    range_max: float
-
-    @property
-    def columns(self) -> int:
-        """Number of rays in a row; raises RefusedInput if the angles are inconsistent."""
-        span = self.angle_max - self.angle_min
-        if not (math.isfinite(span) and math.isfinite(self.angle_increment)):
-            raise RefusedInput("scans refused", f"angles {self.angle_min} to {self.angle_max}, must be finite")
-        # For a single ray, Gazebo publishes an increment that cannot be used as a divisor.
-        if abs(self.angle_increment) < _NO_BEARING:
-            return 1
-        columns = round(span / self.angle_increment) + 1
-        if columns < 1:
-            raise RefusedInput("scans refused", f"angle_increment {self.angle_increment} does not lead to angle_max")
-        return columns
-
-
-def rays_of_scan(layout: ScanLayout, ranges: np.ndarray, intensities: np.ndarray, vertical_opening: float) -> Rays:
+def rays_of_scan(scan: Any, vertical_opening: float) -> Rays:
     """Return the rays of a LaserScan as gazebo_ros_laser publishes it: the rows of a pyramid, one after the other.
 
-    ranges: (n,) m, inf or at least range_max where nothing was hit, -inf where something was too near.
-    intensities: (n,) or (0,), laser_retro. vertical_opening: rad from the lowest row to the highest, which the
-    message does not contain. Raises RefusedInput.
+    Its ranges are inf or at least range_max where nothing was hit, -inf where something was too near, its intensities
+    laser_retro, if there are any. vertical_opening: rad from the lowest row to the highest, which the message does not
+    contain. Raises RefusedInput.
     """
-    columns = layout.columns
-    if not len(ranges) or len(ranges) % columns:
+    columns, count = _columns(scan), len(scan.ranges)
+    if not count or count % columns:
         raise RefusedInput(
             "scans refused",
-            f"{len(ranges)} ranges are not a multiple of the {columns} columns between angle_min and angle_max",
+            f"{count} ranges are not a multiple of the {columns} columns between angle_min and angle_max",
         )
-    rows = len(ranges) // columns
-    grid = np.asarray(ranges, dtype=np.float64).reshape(rows, columns)
-    retro = np.asarray(intensities, dtype=np.float64).reshape(rows, columns) if len(intensities) == grid.size else None
-    half = 0.5 * vertical_opening
+    rows = count // columns
+    grid = np.asarray(scan.ranges, dtype=np.float64).reshape(rows, columns)
+    has_retro, half = len(scan.intensities) == count, 0.5 * vertical_opening
+    retro = np.asarray(scan.intensities, dtype=np.float64).reshape(rows, columns) if has_retro else None
     return Rays(
-        _without_misses(grid, layout.range_max), np.linspace(-half, half, rows) if rows > 1 else np.zeros(1),
-        np.linspace(layout.angle_min, layout.angle_max, columns), retro,
+        _without_misses(grid, scan.range_max), np.linspace(-half, half, rows) if rows > 1 else np.zeros(1),
+        np.linspace(scan.angle_min, scan.angle_max, columns), retro,
     )  # fmt: skip
+
+
+def _columns(scan: Any) -> int:
+    """Return the number of rays in a row of a LaserScan; raises RefusedInput if its angles are inconsistent."""
+    span = scan.angle_max - scan.angle_min
+    if not (math.isfinite(span) and math.isfinite(scan.angle_increment)):
+        raise RefusedInput("scans refused", f"angles {scan.angle_min} to {scan.angle_max}, must be finite")
+    # For a single ray, Gazebo publishes an increment that cannot be used as a divisor.
+    if abs(scan.angle_increment) < _NO_BEARING:
+        return 1
+    columns = round(span / scan.angle_increment) + 1
+    if columns < 1:
+        raise RefusedInput("scans refused", f"angle_increment {scan.angle_increment} does not lead to angle_max")
+    return columns
 
 
 def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: int, nothing_range: float) -> Rays:
@@ -136,26 +126,18 @@ def _without_misses(ranges: np.ndarray, nothing_range: float) -> np.ndarray:
     return np.where(hit, ranges, np.inf)
 
 
-def contacts_of_grid(
-    ranges: np.ndarray, elevations: np.ndarray, bearings: np.ndarray, retro: Optional[np.ndarray] = None
-) -> Contacts:
-    """Return the contacts of one beam.
+def contacts_of_grid(rays: Rays) -> Contacts:
+    """Return the contacts of one beam, whose axis the angles of its rays are off, up and left positive.
 
-    ranges: (rows, columns) m; values not finite or not above 0 mean that nothing was hit. elevations: (rows,) and
-    bearings: (columns,) rad off the beam's axis, up and left positive. retro: (rows, columns) share of pressure
-    reflected, 0 to 1, as in <laser_retro>; 0 or None: the default material. Incidence angles follow from neighbours in
-    the grid; with one row, surfaces count as vertical; with one column, as perpendicular to the beam. Raises ValueError
-    for shapes that do not fit together.
+    A retro is the share of pressure reflected, 0 to 1, as in <laser_retro>; 0 or None: the default material. Incidence
+    angles follow from neighbours in the grid; with one row, surfaces count as vertical; with one column, as
+    perpendicular to the beam.
     """
-    ranges = np.asarray(ranges, dtype=np.float64)
-    if ranges.shape != (len(elevations), len(bearings)):
-        raise ValueError(f"ranges {ranges.shape}, must be {len(elevations)} elevations x {len(bearings)} bearings")
-    ranges = np.where(np.isfinite(ranges), ranges, np.inf)
-    ranges = np.where(ranges > 0.0, ranges, np.inf)
-    level = np.cos(elevations)[:, np.newaxis]
-    rising = np.broadcast_to(np.sin(elevations)[:, np.newaxis], ranges.shape)
+    ranges, bearings = rays.ranges, rays.bearings
+    level = np.cos(rays.elevations)[:, np.newaxis]
+    rising = np.broadcast_to(np.sin(rays.elevations)[:, np.newaxis], ranges.shape)
     directions = np.stack([level * np.cos(bearings), level * np.sin(bearings), rising], axis=-1)
-    material, materials = _materials(ranges.shape, retro)
+    material, materials = _materials(ranges.shape, rays.retro)
     return Contacts.of_ranges(
         ranges.reshape(1, -1), directions.reshape(1, -1, 3), _cosines(ranges, directions).reshape(1, -1),
         material.reshape(1, -1), materials,

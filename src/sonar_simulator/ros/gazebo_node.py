@@ -19,7 +19,7 @@ from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.ros.conversions import POINT_FIELDS, header, points_from_message
 from sonar_processing.ros.transform_filter import TransformFilter
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.echoes.ray_grid import Rays, ScanLayout, rays_of_points, rays_of_scan
+from sonar_simulator.echoes.ray_grid import Rays, rays_of_points, rays_of_scan
 from sonar_simulator.gazebo_beams import GROUPS, GazeboBeams, GazeboSonarParameters, HeadMode, RayScan
 from sonar_simulator.ros.publisher import MESSAGES
 from sonar_simulator.simulation.simulation import Ping
@@ -43,9 +43,7 @@ def ray_scan(message: AnyMsg, parameters: GazeboSonarParameters) -> RayScan:
 
 
 def _of_laser_scan(scan: LaserScan, parameters: GazeboSonarParameters) -> Rays:
-    layout = ScanLayout(scan.angle_min, scan.angle_max, scan.angle_increment, scan.range_max)
-    opening = math.radians(parameters.vertical_opening_deg)
-    return rays_of_scan(layout, np.asarray(scan.ranges), np.asarray(scan.intensities), opening)
+    return rays_of_scan(scan, math.radians(parameters.vertical_opening_deg))
 
 
 def _of_point_cloud(cloud: PointCloud, parameters: GazeboSonarParameters) -> Rays:

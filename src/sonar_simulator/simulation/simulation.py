@@ -105,19 +105,16 @@ class Simulation:
 
     def __init__(
         self, movement: Movement, odometry: Union[Odometry, NoOdometry], sonar: Sonar, head: Optional[SonarHead],
-        T_base_sonar: np.ndarray, servo: Optional[Servo] = None, tilt_commands: Sequence[TiltCommand] = (),
+        T_base_sonar: np.ndarray, servo: Servo, tilt_commands: Sequence[TiltCommand],
     ) -> None:  # fmt: skip
-        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0; without `servo` the mount is fixed.
-
-        Without `head` there are no pings.
-        """
+        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0. Without `head` there are no pings."""
         self.duration = movement.duration
         self._movement = movement
         self._odometry = odometry
         self._sonar = sonar
         self._head = head
         self._T_base_sonar = T_base_sonar
-        self._servo = servo or Servo(ServoParameters())
+        self._servo = servo
         self._tilt_commands = list(tilt_commands)
 
     def moments(self, tick_rate: float, beams_at_once: int = 1) -> Iterator[Moment]:
