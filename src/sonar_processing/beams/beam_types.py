@@ -216,8 +216,3 @@ _TYPES: Tuple[BeamType, ...] = (
 
 BEAM_TYPES: Dict[str, BeamType] = {name: kind for kind in _TYPES for name in kind.names}
 """By every name that a type has in ROS 1."""
-
-
-def ros1_name(name: str) -> str:
-    """Return package/Type of a type's name, which in ROS 2 is package/msg/Type."""
-    return name.replace("/msg/", "/")

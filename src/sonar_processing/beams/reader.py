@@ -9,7 +9,7 @@ from node_support.headers import check_frame, check_stamp
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_fields import BeamFields
-from sonar_processing.beams.beam_types import BEAM_TYPES, OWN, AngleUnit, BeamType, RadiansOrGradians, ros1_name
+from sonar_processing.beams.beam_types import BEAM_TYPES, OWN, AngleUnit, BeamType, RadiansOrGradians
 
 _REFUSED = "beams refused"
 
@@ -166,7 +166,8 @@ def _fields(read: Callable[[Any], List[BeamFields]], type_name: str, message: An
 
 def beam_type(type_name: str) -> BeamType:
     """Return what is known of a type by its name in ROS 1 or 2; raises RefusedInput for a type that is not read."""
-    kind = BEAM_TYPES.get(ros1_name(type_name))
+    # package/msg/Type in ROS 2, package/Type in ROS 1
+    kind = BEAM_TYPES.get(type_name.replace("/msg/", "/"))
     if kind is None:
         raise RefusedInput(
             "messages of unknown types", f"{type_name} is not read as beams; known are {', '.join(BEAM_TYPES)}"

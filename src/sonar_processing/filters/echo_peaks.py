@@ -42,10 +42,7 @@ class EchoStatistics:
 
     def add(self, strengths: np.ndarray) -> None:
         """Take the beams of a turn: (beams, bins), any numeric type."""
-        self._count(strengths)
         self._correlation += _autocorrelation(strengths.astype(np.float32))
-
-    def _count(self, strengths: np.ndarray) -> None:
         strongest = float(strengths.max(initial=0))
         if strongest > self._strongest:
             self._strongest, self._as_strong = strongest, 0

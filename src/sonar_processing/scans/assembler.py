@@ -193,7 +193,7 @@ class MovingState:
 
     def take(self, linear: Sequence[float], angular: Sequence[float]) -> None:
         """Take a velocity, m/s and rad/s. Raises RefusedInput when it is not finite; then the last one stays."""
-        speed, turn_rate = _length(linear), _length(angular)
+        speed, turn_rate = math.hypot(*linear), math.hypot(*angular)
         if not (math.isfinite(speed) and math.isfinite(turn_rate)):
             raise RefusedInput("velocities refused", f"{tuple(linear)} m/s, {tuple(angular)} rad/s, must be finite")
         self._speed, self._turn_rate = speed, turn_rate
@@ -211,7 +211,3 @@ class MovingState:
         if self._since_ns is None or stamp_ns < self._since_ns:
             self._since_ns = stamp_ns
         return (stamp_ns - self._since_ns) * 1e-9
-
-
-def _length(vector: Sequence[float]) -> float:
-    return math.sqrt(sum(value * value for value in vector))
