@@ -165,7 +165,7 @@ def _add_line(
 def _laid_out(figure: go.Figure, height: Optional[int]) -> go.Figure:
     """Return the figure in the page's style; without a height it fills what holds it."""
     return figure.update_layout(
-        template="plotly_white", height=height, margin={"l": 60, "r": 20, "t": 20, "b": 50},
+        template="plotly_white", height=height, margin={"l": 60, "r": 20, "t": 40, "b": 50},
         legend={"orientation": "h", "y": -0.12 if height is None else -0.25, "yanchor": "top"},
     )  # fmt: skip
 

@@ -132,13 +132,13 @@ def _errors(mission: Mission) -> str:
 
 
 def _calibration(mission: Mission) -> str:
-    if not mission.calibration:
-        return "<p>Nothing was calibrated.</p>"
+    found = {_QUANTITIES[name]: told for name, told in mission.calibration.items()}
     rows = [
         (quantity.what, quantity.told(value), f"± {quantity.number(deviation)}")
-        for quantity, (value, deviation) in ((_QUANTITIES[name], found) for name, found in mission.calibration.items())
+        for quantity, (value, deviation) in found.items()
+        if deviation > 0.0  # others are no unknowns of this run, as those of an odometry that nobody reports
     ]
-    return _table(("", "in truth", "standard deviation"), rows)
+    return _table(("", "in truth", "standard deviation"), rows) if rows else "<p>Nothing was calibrated.</p>"
 
 
 def _rejected(mission: Mission) -> str:

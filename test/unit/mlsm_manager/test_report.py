@@ -89,6 +89,11 @@ class TestPage:
     def test_the_calibration_is_told_in_units_and_words(self, page_of, name, value, told):
         assert f"<td>{told}" in page_of(replace(mission(), calibration={name: (value, 0.01)}))
 
+    def test_what_was_no_unknown_of_the_run_is_not_told_as_calibrated(self, page_of):
+        page = page_of(replace(mission(), calibration={"sonar_delay": (0.5, 0.1), "odometry_scale": (0.0, 0.0)}))
+        assert "later than their stamps" in page
+        assert "distances of the odometry" not in page
+
     def test_distances_from_the_truth_are_told_where_there_is_one(self, page_of):
         page = page_of(mission(errors={"dead_reckoning": {"mean": 6.29, "sd": 3.0, "max": 12.8}}))
         assert "<td>dead reckoning</td><td>6.29</td><td>3.00</td><td>12.80</td>" in page
