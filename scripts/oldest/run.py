@@ -1,10 +1,11 @@
-"""Runs the unit tests with the oldest versions that the package claims, in the environment of environment.py.
+"""Runs tests with the oldest versions that the package claims, in the environment of environment.py.
 
 What the package does is shown with the newest versions. Here it is shown that all which it asks of Python, numpy,
-scipy, numba and the others is there and means the same. One case of each test does for that, and none of those that are
-long, which take many scans through the same code, or marked newest_only.
+scipy, numba and the others is there, which test/oldest asks of every line, and means the same, which unit tests of what
+is close to other libraries show. One case of each test does for that, and none of those that are long, which take many
+scans through the same code.
 
-Arguments go to pytest: python3 scripts/oldest/run.py test/unit/mlsm_manager
+Arguments go to pytest, in place of these tests: python3 scripts/oldest/run.py test/unit/mlsm_manager
 """
 
 import os
@@ -14,6 +15,25 @@ from typing import Dict, List
 
 from environment import ENVIRONMENT, ROOT
 from environment import main as make
+
+CLOSE_TO_LIBRARIES = {
+    "autopilot_link": ("protocol",),
+    "georeferencing": ("origin",),
+    "mlsm_manager": (
+        "block_store", "charts", "comparisons", "compiled_distances", "each", "hovering", "joint_solver", "map_export",
+        "map_file", "map_tool", "mlsm_map", "place_search", "report", "run_files", "thesis_matching",
+    ),
+    "node_support": ("support_files", "support_memory", "support_numba_cache", "support_parameters"),
+    "ping360_driver": ("ping360_protocol",),
+    "recordings": ("autopilot_logs", "ping_viewer_next", "recordings_bags", "recordings_inspection", "sweep_shifts"),
+    "sonar_driver": ("driver_port",),
+    "sonar_processing": (
+        "processing_echo_extraction", "processing_outliers", "processing_shapes", "processing_threshold",
+    ),
+    "sonar_simulator": ("simulator_bag_tool", "simulator_mesh_file", "simulator_physical", "simulator_rays"),
+    "web_page": ("server",),
+}  # fmt: skip
+"""Names of test files in each folder of test/unit."""
 
 
 def variables() -> Dict[str, str]:
@@ -34,13 +54,19 @@ def _ros_folders() -> List[str]:
     return [folder for folder in sys.path if folder.endswith("-packages") and "/venv/" not in folder]
 
 
+def _chosen() -> List[str]:
+    files = [f"test/unit/{folder}/test_{name}.py" for folder, names in CLOSE_TO_LIBRARIES.items() for name in names]
+    return ["test/oldest", *files]
+
+
 def main(arguments: List[str]) -> int:
     """Make the environment where it is missing and run pytest in it; return the exit status."""
     status = make()
     if status:
         return status
-    pytest = ["-m", "pytest", "-p", "fewer_tests", "--hypothesis-profile=few", "-m", "not long and not newest_only"]
-    command = [str(ENVIRONMENT / "bin/python"), *pytest, *arguments]
+    pytest = ["-m", "pytest", "-p", "fewer_tests", "--hypothesis-profile=few", "-m", "not long"]
+    names_paths = any(not word.startswith("-") for word in arguments)
+    command = [str(ENVIRONMENT / "bin/python"), *pytest, *([] if names_paths else _chosen()), *arguments]
     return subprocess.run(command, cwd=str(ROOT), env=variables(), check=False).returncode
 
 

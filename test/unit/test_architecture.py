@@ -10,8 +10,6 @@ from functools import lru_cache
 import pytest
 from programs import ROOT
 
-pytestmark = pytest.mark.newest_only("about the text of the sources")
-
 SOURCES = ROOT / "src"
 ALLOWED = {
     "node_support": set(),

@@ -4,9 +4,9 @@ import re
 from importlib import import_module
 
 import pytest
+from benchmarks.__main__ import SECTIONS, STUDIES
 from programs import ROOT
 
-pytestmark = pytest.mark.newest_only("about the text of the documents")
 DOCS = sorted((ROOT / "docs").glob("*.md"))
 PAGES = [ROOT / "README.md", ROOT / "migration" / "README.md", *DOCS]
 PAGES_BY_NAME = {path.relative_to(ROOT).as_posix(): path for path in PAGES}
@@ -104,9 +104,6 @@ def test_every_table_of_figures_names_the_command_that_prints_it(page):
 
 @pytest.mark.parametrize("page", PAGES_BY_NAME)
 def test_every_benchmark_that_a_page_names_exists(page):
-    # Here, so that a run with the oldest versions, which leaves the test out, does not import them.
-    from benchmarks.__main__ import SECTIONS, STUDIES
-
     named = re.findall(r"scripts/bench (?:--)?([a-z][\w-]*)", PAGES_BY_NAME[page].read_text())
     assert {name.replace("-", "_") for name in named} - {
         name.replace("-", "_") for name in (*SECTIONS, *STUDIES)

@@ -9,8 +9,6 @@ from made_recordings import SECONDS, touring
 
 from mlsm_manager.offline.recording import Recording
 
-pytestmark = pytest.mark.newest_only("about a benchmark")
-
 # Every fifth beam, with its pose: faults take beam by beam.
 WHOLE = replace(touring(), beams=touring().beams[::5])
 FAULTS = {name: make for name, (_, make) in faults(SECONDS).items() if name != "nothing"}

@@ -35,7 +35,6 @@ def parameters(name, **arguments):
     return {key: one.value for key, one in config.params.items()}
 
 
-@pytest.mark.newest_only("roslaunch itself needs a package that is not installed for the oldest Python")
 @pytest.mark.parametrize("processes", ["one", "many"])
 @pytest.mark.parametrize("name", ["vehicle", "mapping", "play_bag"])
 def test_every_node_that_looks_up_the_sonar_gets_its_frame(name, processes):
@@ -45,14 +44,12 @@ def test_every_node_that_looks_up_the_sonar_gets_its_frame(name, processes):
         assert found[f"/{node}/sonar_frame"] == "ping360_link"
 
 
-@pytest.mark.newest_only("roslaunch itself needs a package that is not installed for the oldest Python")
 def test_a_recording_is_played_with_the_shapes_estimator_and_odometry_that_are_asked_for():
     found = parameters("play_bag", bag="/none.bag", shapes="false", estimator="THESIS", odometry="heading")
     assert found["/mapping/detectors"] == []
     assert (found["/mlsm_core/estimator"], found["/mlsm_core/odometry"]) == ("THESIS", "HEADING")
 
 
-@pytest.mark.newest_only("roslaunch itself needs a package that is not installed for the oldest Python")
 def test_a_topside_behind_a_thin_link_sends_who_wants_the_page_to_the_vehicle():
     assert "/web_page/map_frame" in parameters("topside", web="true")
     assert "/web_page/map_frame" not in parameters("topside", link="thin")

@@ -14,8 +14,6 @@ from programs import ROOT
 from sonar_processing.ros.conversions import header, point_cloud
 from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
-pytestmark = pytest.mark.newest_only("rosbag runs with ROS's own Python")
-
 RULES = ROOT / "migration" / "avora_msgs.bmr"
 START = genpy.Time(1400000000, 123456789)
 

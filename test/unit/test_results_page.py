@@ -10,8 +10,6 @@ from thesis_results.__main__ import SECTIONS
 from thesis_results.page import Section, sections_of, write_page
 from thesis_results.pictures import MOST_BYTES, Pictures, new_figure
 
-pytestmark = pytest.mark.newest_only("about the page of a script")
-
 
 def _section(word, chapter="7.1", recordings=()):
     return Section(word, chapter, word.capitalize(), lambda pictures: f"{word} is made", recordings)

@@ -17,8 +17,6 @@ from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residu
 from mlsm_manager.scan_matching.scan import MatchStatus, corrected_points
 from mlsm_manager.scan_matching.scan_path import SCALE
 
-pytestmark = pytest.mark.newest_only("slow; scans are matched with every version by the tests of the localiser")
-
 FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
 
 

@@ -13,8 +13,6 @@ from mlsm_manager.offline.bag_mapping import with_odometry_mended
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import wrapped
 
-pytestmark = pytest.mark.newest_only("slow; the checks and the solver are tested with every version")
-
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START = WHOLE.track.times[0]
 TREMBLING = broken.with_compass_error(WHOLE, trembling(WHOLE))

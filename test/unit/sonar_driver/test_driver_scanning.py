@@ -168,7 +168,6 @@ def experiment(request):
     return request.param, run(request.param, 3000, seed=3)
 
 
-@pytest.mark.newest_only("3,000 replies; the other tests send single ones with every version")
 class TestExperiment:
     def test_it_met_every_fault(self, experiment):
         sonar, account = experiment

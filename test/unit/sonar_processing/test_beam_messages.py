@@ -287,7 +287,6 @@ def test_the_page_of_sonars_says_of_every_type_what_the_table_does(name):
         assert words in row
 
 
-@pytest.mark.newest_only("5,000 messages; the other tests read single ones with every version")
 # genpy warns of names that are no UTF-8, and its generated code writes arrays with the old name of tobytes.
 @pytest.mark.filterwarnings("ignore")
 def test_no_damaged_message_crashes_and_each_is_counted():
