@@ -112,7 +112,7 @@ def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
 
 def _damaged_files() -> Step:
     """Return the step of scripts/fuzz, with few of its damages."""
-    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "10"]
+    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "6"]
     variables = {"PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}", "OPENBLAS_NUM_THREADS": "1"}
     return Step("damaged files", command, load=Load.SPARE, timeout=SPARE_TIMEOUT, variables=variables)
 

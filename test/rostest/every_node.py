@@ -38,7 +38,8 @@ BAD_STARTS: List[Tuple[str, str, str]] = [
     ("ping360_driver", "port:=udp://nowhere", "must be udp://HOST:PORT"),
 ]
 UNKNOWN = "no_such_parameter:=1", "no_such_parameter = 1: no such parameter"
-BAD_STARTS += [(node, *UNKNOWN) for node in sorted(set(LIVE_NODES) - {node for node, *_ in BAD_STARTS}) + sorted(HOSTS)]
+# A node, a stage that a host may run, and such a host: all nodes read their parameters as one of these does.
+BAD_STARTS += [(node, *UNKNOWN) for node in ("mlsm_core", "outlier_remover", "mapping")]
 
 
 def bad_values(field: Field) -> List[Any]:

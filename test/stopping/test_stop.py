@@ -15,7 +15,6 @@ ATTEMPTS = 8
     ("launch_file", "arguments"),
     [
         ("demo.launch", ["rviz:=false"]),
-        ("survey_simulated.launch", ["rviz:=false"]),
         ("driver_emulated.launch", ["sonar:=ping360"]),
         ("play_bag.launch", ["rviz:=false", BAG]),
         ("vehicle.launch", ["standing:=true", "servo:=true", "processes:=many"]),

@@ -116,7 +116,7 @@ def test_a_heading_that_stuck_turns_evenly_meanwhile():
 def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed():
     noise = 0.002 * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
     alone = broken.with_compass_error(WHOLE.without_positions(), noise)
-    found = mapped_as(broken.odometry_freezes(alone, MIDDLE, 40.0), "--refine")
+    found = mapped_as(broken.odometry_freezes(alone, MIDDLE, 40.0), "--refine", "--odometry", "heading")
     assert_named_first(found.findings, "the compass stuck for 40 s and missed ")
     assert off(found).mean() < 1.0  # m
 
@@ -133,7 +133,7 @@ def test_a_slip_of_the_head_is_suspected_beside_a_compass_alone_where_scans_lie_
 
 @pytest.mark.long
 def test_a_slip_of_the_head_beside_a_compass_alone_is_named_and_the_path_fitted_without_it():
-    found = mapped_as(broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0), "--refine")
+    found = mapped_as(broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0), "--refine", "--odometry", "heading")
     assert_named_first(found.findings, "the head slipped by 2")
     assert off(found).mean() < 1.0  # m
 

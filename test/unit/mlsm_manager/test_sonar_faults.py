@@ -54,19 +54,20 @@ def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("recording", "said", "most"),
+    ("recording", "said", "options"),
     [
-        (broken.mount_shifted(WHOLE, 2.0), "the sonar sits +", 0.5),
-        (mount_tilted(WHOLE, 25.0), "the sonar's plane is tilted by about 2", 0.5),
-        (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", 0.5),
-        (broken.range_changed(COMPASS, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", 0.5),
-        (broken.mount_upside_down(COMPASS), "the sonar is upside down, or its head turns the other way", 0.5),
+        (broken.mount_shifted(WHOLE, 2.0), "the sonar sits +", ()),
+        (mount_tilted(WHOLE, 25.0), "the sonar's plane is tilted by about 2", ()),
+        (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", ()),
+        (broken.range_changed(COMPASS, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", ()),
+        # Named: to try whether the vehicle strafes as well would take longest, which the one before does.
+        (broken.mount_upside_down(COMPASS), "the sonar is upside down, or its head turns", ("--odometry", "heading")),
     ],
     ids=["arm", "tilt", "ranges", "ranges by compass", "over by compass"],
 )
-def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, most):
-    found = mapped_as(recording, "--refine")
+def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, options):
+    found = mapped_as(recording, "--refine", *options)
     assert found.findings.trust.causes[0].text.startswith(said)
     assert found.findings.trust.line.startswith("trust: DOUBTFUL")
     truth = WHOLE.track.at(found.run.times) - WHOLE.track.poses[0] + recording.track.poses[0]
-    assert np.hypot(*(found.run.best - truth)[:, :2].T).mean() < most  # m
+    assert np.hypot(*(found.run.best - truth)[:, :2].T).mean() < 0.5  # m
