@@ -51,8 +51,3 @@ def test_dynamic_reconfigure_has_the_ranges_of_numbers(live):
     numbers = [field for field in parameters.tunable_fields() if field.type in (int, float)]
     expected = {field.name: (describe(field).low, describe(field).high) for field in numbers}
     assert {name: (module.min[name], module.max[name]) for name in expected} == expected
-
-
-def test_dynamic_reconfigure_accepts_what_it_offers(live):
-    parameters, module = live
-    assert parameters().changed(module.defaults) == parameters()

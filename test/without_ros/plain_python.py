@@ -34,7 +34,6 @@ def install(copy: Path) -> None:
         stamp.write_bytes(wanted)
     else:
         _pip("--no-deps", "--no-build-isolation", "--no-index", "--force-reinstall", str(copy))
-    _keep_compiled_loops()
     run("python", "-c", "import matplotlib.font_manager", folder=copy)
 
 
@@ -57,13 +56,6 @@ def _copy_sources(copy: Path) -> None:
         shutil.copytree(str(ROOT / name), str(copy / name), ignore=shutil.ignore_patterns("__pycache__", "*.egg-info"))
     for name in _DESCRIPTIONS:
         shutil.copy(str(ROOT / name), str(copy / name))
-
-
-def _keep_compiled_loops() -> None:
-    """Spare half a minute: numba takes what it compiled for a file of the same time and size, and pip sets others."""
-    (modules,) = ENVIRONMENT.glob("lib/*/site-packages")
-    for source in (ROOT / "src").rglob("*.py"):
-        shutil.copystat(str(source), str(modules / source.relative_to(ROOT / "src")))
 
 
 def _pip(*arguments: str) -> None:

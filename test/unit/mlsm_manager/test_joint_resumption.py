@@ -87,25 +87,6 @@ def test_what_was_stored_stays_as_it_is_while_scans_are_taken(stored):
         assert map_bytes(saved) == before
 
 
-def test_the_newest_scans_of_a_resumed_run_may_still_move(stored):
-    localiser = resumed(stored)
-    before = localiser.estimator.solver.state.nodes[KILLED_AFTER].copy()
-    taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 2])
-    assert np.abs(localiser.estimator.solver.state.nodes[KILLED_AFTER] - before).max() > 1e-6
-
-
-def test_a_resumed_map_is_the_one_that_was_saved(killed, stored):
-    again = resumed(stored)
-    assert (again.block_count, again.believed_until) == (killed.block_count, killed.believed_until)
-
-
-def test_a_second_kill_loses_no_more_than_the_first(stored):
-    once = resumed(stored)
-    twice = resumed(map_of_bytes(map_bytes(once.stored("map", {}, 0.0, "run"))))
-    one, other = (taken(localiser, HARBOUR.scans[KILLED_AFTER:])[-1] for localiser in (once, twice))
-    np.testing.assert_allclose(one.belief.theta, other.belief.theta, atol=1e-9)
-
-
 @pytest.mark.parametrize("has_run", [True, False])
 def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(stored, has_run):
     localiser = resumed(stored if has_run else without_a_run(stored))

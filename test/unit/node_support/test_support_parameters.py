@@ -143,23 +143,9 @@ def test_an_enumeration_is_taken_as_member_or_by_value(value):
     assert ExampleParameters(color=value).color is Color.DEEP_BLUE
 
 
-def test_a_change_keeps_everything_else():
-    changed = ExampleParameters(count=7).changed({"radius": 2.0})
-    assert changed == ExampleParameters(count=7, radius=2.0)
-
-
 def test_a_change_is_checked_against_the_values_that_stay():
     with pytest.raises(ParameterError, match="inner"):
         ExampleParameters().changed({"radius": 0.1})
-
-
-def test_a_set_cannot_be_written_to():
-    with pytest.raises(dataclasses.FrozenInstanceError):
-        ExampleParameters().radius = 2.0
-
-
-def test_plain_values_hold_enumerations_by_value():
-    assert ExampleParameters().to_mapping()["color"] == "red"
 
 
 @given(st.floats(0.5, 10.0), st.integers(1, 1000), st.booleans(), st.text(min_size=1), st.sampled_from(list(Color)))
