@@ -8,11 +8,10 @@ import threading
 import time
 import tty
 from collections import deque
-from typing import Callable, Deque, Optional, Tuple, Union
+from typing import Deque, Optional, Tuple, Union
 
 from sonar_driver.emulated_head import EmulatedHead, Transmission
 
-_PATIENCE = 1.0  # s: a thread that has not changed its state by now has failed
 _WAKE_SIZE = 4096  # Bytes: more than are ever written to wake the server
 _READ_SIZE = 4096  # Bytes: many commands; a read takes what is there
 _LONGEST_DATAGRAM = 65535  # Bytes
@@ -116,9 +115,7 @@ class HeadServer:
         self.head = head
         self._line = line
         self._present = False
-        self._changed = threading.Condition()
         self._outgoing: Deque[Transmission] = deque()
-        self._hidden_until = float("-inf")
         self._stop = threading.Event()
         self._wake_reader, self._wake_writer = os.pipe()
         self._thread: Optional[threading.Thread] = None
@@ -149,26 +146,6 @@ class HeadServer:
         self._stop.set()
         self._wake()
 
-    def disappear(self) -> None:
-        """Remove the line until `reappear`; it is gone when this returns."""
-        self._hide_until(float("inf"))
-        self._await(lambda: not self._present)
-
-    def reappear(self) -> None:
-        """Bring the line back; it is there when this returns."""
-        self.head.absent_until = float("-inf")
-        self._hide_until(float("-inf"))
-        self._await(lambda: self._present)
-
-    def _hide_until(self, moment: float) -> None:
-        self._hidden_until = moment
-        self._wake()
-
-    def _await(self, condition: Callable[[], bool]) -> None:
-        # Only the serving thread opens and closes the line, because it may be waiting on it at this moment.
-        with self._changed:
-            self._changed.wait_for(condition, timeout=_PATIENCE)
-
     def _turn(self) -> None:
         self._show_or_hide()
         now = time.monotonic()
@@ -184,21 +161,11 @@ class HeadServer:
             self._outgoing.extend(self.head.receive(self._line.read(), time.monotonic()))
 
     def _show_or_hide(self) -> None:
-        now = time.monotonic()
-        hidden = self._gone_at() <= now < self._back_at()
-        if hidden == self._present:
-            with self._changed:
-                if hidden:
-                    self._vanish()
-                else:
-                    self._appear()
-                self._changed.notify_all()
-
-    def _gone_at(self) -> float:
-        return self.head.absent_from if self._hidden_until <= time.monotonic() else float("-inf")
-
-    def _back_at(self) -> float:
-        return max(self._hidden_until, self.head.absent_until)
+        hidden = self.head.absent_from <= time.monotonic() < self.head.absent_until
+        if hidden and self._present:
+            self._vanish()
+        elif not hidden and not self._present:
+            self._appear()
 
     def _send_due(self, now: float) -> None:
         while self._outgoing and self._outgoing[0].time <= now:
@@ -206,9 +173,9 @@ class HeadServer:
 
     def _until_next_event(self, now: float) -> Optional[float]:
         if not self._present:
-            moment = self._back_at()
+            moment = self.head.absent_until
         else:
-            gone_at = self._gone_at() if now < self._back_at() else float("inf")
+            gone_at = self.head.absent_from if now < self.head.absent_until else float("inf")
             moment = min(gone_at, self.head.next_event, self._outgoing[0].time if self._outgoing else float("inf"))
         return max(0.0, moment - now) if moment < float("inf") else None
 

@@ -186,11 +186,29 @@ def served_line(port):
     return UdpLine(*datagram_address(port)) if is_datagram_port(port) else PtyLine(port)
 
 
+class HideableServer(HeadServer):
+    """A server whose line can be taken away and brought back; both are done when the methods return."""
+
+    def disappear(self):
+        self.head.absent_from, self.head.absent_until = -math.inf, math.inf
+        self._wait_until_present_is(False)
+
+    def reappear(self):
+        self.head.absent_until = -math.inf
+        self._wait_until_present_is(True)
+
+    def _wait_until_present_is(self, wanted):
+        self._wake()
+        end = time.monotonic() + PATIENCE
+        while self._present is not wanted and time.monotonic() < end:
+            time.sleep(_POLL)
+
+
 @contextmanager
 def served(sonar, port, head=None, **changes):
     """Yield the server of an emulated head, and the parameters to connect to it."""
     connection = sonar.connection_to(str(port), **changes)
-    with HeadServer(head or sonar.emulated(connection), served_line(connection.port)) as server:
+    with HideableServer(head or sonar.emulated(connection), served_line(connection.port)) as server:
         yield server, connection
 
 
