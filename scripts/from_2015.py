@@ -5,7 +5,7 @@ from typing import Any, Dict, List, Mapping, Type
 
 import yaml
 
-from node_support.names_2015 import KEYS, NAMES, Kind
+from mlsm_manager.migrate_yaml import KEYS, TABLE
 from node_support.parameters import EXPERT, ParameterSet, describe
 
 _PARAMETERS = """\
@@ -21,11 +21,11 @@ Empty: no counterpart, or no default. `expert/` is the key that the parameter st
 def from_2015_tables(nodes: Mapping[str, Type[ParameterSet]], thesis: Mapping[str, Any]) -> str:
     """Return the page from its first table on. nodes: parameters by node. thesis: what yaml/thesis.yaml holds."""
     lines: List[str] = []
-    for kind in Kind:
-        lines += [f"## {kind.value}", "", "| 2015 | here | |", "| --- | --- | --- |"]
-        for one in NAMES:
-            if one.kind is kind:
-                lines.append(f"| {one.before} | {f'`{one.here}`' if one.here else ''} | {one.remark} |")
+    for kind, names in TABLE["names"].items():
+        lines += [f"## {kind}", "", "| 2015 | here | |", "| --- | --- | --- |"]
+        for before, now in names.items():
+            here = f"`{now['here']}`" if "here" in now else ""
+            lines.append(f"| {before} | {here} | {now.get('remark', '')} |")
         lines.append("")
     lines.append(_PARAMETERS)
     rows = [_row(nodes[key.node], thesis.get(key.node, {}), key) for key in KEYS]

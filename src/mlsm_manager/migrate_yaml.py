@@ -1,15 +1,15 @@
 """migrate_yaml: makes one file of today's parameters of the parameter files of 2015."""
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
 
 import yaml
 
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from node_support.files import check_output, write_whole
+from node_support.files import check_output, package_folder, write_whole
 from node_support.help import CommandLine, ending_in_one_line
-from node_support.names_2015 import KEYS, Key
 from node_support.parameters import EXPERT, ParameterError, ParameterSet, read_values
 from sonar_processing.filters.outliers import OutlierRemoverParameters
 from sonar_processing.filters.threshold import ThresholderParameters
@@ -27,10 +27,50 @@ NODES: Dict[str, Type[ParameterSet]] = {
     "sonar_control": SonarControlParameters,
 }
 """Nodes that had parameter files in 2015."""
+
+
+@dataclass(frozen=True)
+class Key:
+    """A parameter `key` of a node of 2015, its `owner`.
+
+    before: its default in the code. here: today's name of the parameter of `node`; empty where there is none.
+    remark: why its default is another, what takes its place. also: another parameter that takes the same value.
+    """
+
+    owner: str
+    node: str
+    key: str
+    before: Any
+    here: str = ""
+    remark: str = ""
+    also: str = ""
+
+    def taken(self, value: Any) -> Any:
+        """Return today's value of that of 2015, whose modes were found by their parts."""
+        return _MODES[self.owner](value) if self.key == "mode" and self.owner in _MODES else value
+
+
+def _scan_mode(value: str) -> str:
+    return ("LASER" if "LASER" in value else "SONAR") + ("CONT" if "CONT" in value else "")
+
+
+def _threshold_mode(value: str) -> str:
+    parts = [part for part in ("OTSU", "FIXED", "PROPORTIONAL") if part in value]
+    return "OTSU+PROPORTIONAL" if parts == ["OTSU", "PROPORTIONAL"] else parts[0] if parts else value
+
+
+def _outlier_mode(value: str) -> str:
+    return "STATISTICAL" if "STATISTICAL" in value else "RADIUS"
+
+
+_MODES = {"SonarToCloud": _scan_mode, "Thresholder": _threshold_mode, "OutlierRemover": _outlier_mode}
+TABLE = yaml.safe_load((package_folder() / "migration/names_2015.yaml").read_text(encoding="utf-8"))
 _BEAMS = "sonarSubscribeTopic"
-_BY_OWNER: Dict[str, Dict[str, Key]] = {}
-for _one in KEYS:
-    _BY_OWNER.setdefault(_one.owner, {})[_one.key] = _one
+_BY_OWNER: Dict[str, Dict[str, Key]] = {
+    owner: {key: Key(owner, table["node"], key, **row) for key, row in table["keys"].items()}
+    for owner, table in TABLE["parameters"].items()
+}
+KEYS: List[Key] = [key for keys in _BY_OWNER.values() for key in keys.values()]
 
 
 def run_migrate_yaml() -> None:

@@ -10,9 +10,8 @@ from document import LIVE_NODES
 from programs import ROOT
 from test_live_parameters import launched
 
-from mlsm_manager.migrate_yaml import NODES, migrated, migrated_text
+from mlsm_manager.migrate_yaml import KEYS, NODES, TABLE, migrated, migrated_text
 from node_support.help import HOSTS
-from node_support.names_2015 import KEYS, NAMES, Kind
 from node_support.node_table import NODES as DESCRIBED
 from node_support.parameters import ParameterError, describe
 
@@ -31,17 +30,26 @@ FILES = {
 """As the files of 2015 are."""
 
 
-def named(kind):
-    return pytest.mark.parametrize("name", [one.here for one in NAMES if one.kind is kind and one.here])
+_PASSED_ON = [
+    before
+    for names in TABLE["names"].values()
+    for before, now in names.items()
+    if "`thesis:=true`" in now.get("remark", "")
+]
 
 
-@named(Kind.NODE)
+def named(*kinds):
+    names = [now["here"] for kind in kinds for now in TABLE["names"][kind].values() if "here" in now]
+    return pytest.mark.parametrize("name", names)
+
+
+@named("Nodes and nodelets")
 def test_every_node_exists(name):
     """And is started by every_node.test, but for those that host several of them."""
     assert name in {**DESCRIBED, **HOSTS}
 
 
-@named(Kind.LAUNCH)
+@named("Launch files")
 def test_every_launch_file_can_be_launched(name):
     """With everything that it includes."""
     assert launched(name)
@@ -52,21 +60,21 @@ def _served(node):
     return {one.name.replace("~", f"{node}/") for one in DESCRIBED[node].interfaces}
 
 
-@pytest.mark.parametrize("name", [one.here for one in NAMES if one.kind in (Kind.TOPIC, Kind.SERVICE) and one.here])
+@named("Topics", "Services")
 def test_every_topic_and_service_is_one_of_a_running_node(name):
     served = {"/tf"}.union(*map(_served, DESCRIBED))
     assert name in served or name.rpartition("/")[0] in served
 
 
-@pytest.mark.parametrize("one", [one for one in NAMES if "`thesis:=true`" in one.remark], ids=lambda one: one.before)
-def test_old_names_are_those_of_thesis_topics(one):
+@pytest.mark.parametrize("name", _PASSED_ON)
+def test_old_names_are_those_of_thesis_topics(name):
     """Each of which old_names.test sends a message through, or calls."""
     served = {name.lstrip("/") for name in _served("thesis_topics")}
-    before = {name.split(" ")[0].lstrip("/") for name in one.before.split(", ")}
+    before = {name.split(" ")[0].lstrip("/") for name in name.split(", ")}
     assert before & served
 
 
-@named(Kind.FIELD)
+@named("Fields of messages")
 def test_every_message_and_field_exists(name):
     message, _, field = name.partition(".")
     assert re.search(rf"\s{field}$" if field else "", (ROOT / f"msg/{message}.msg").read_text(), re.MULTILINE)
