@@ -3,6 +3,7 @@
 import re
 from dataclasses import dataclass
 from datetime import datetime, timezone
+from functools import partial
 from typing import List, Optional, Tuple
 
 import numpy as np
@@ -10,7 +11,7 @@ import numpy as np
 from georeferencing.adjustment import COMPASS_DEVIATION, Adjusted, adjusted, of_compass
 from georeferencing.fixes import Fix, PlacedFixes
 from georeferencing.origin import EAST_DEG, Origin
-from node_support.errors import RefusedInput
+from node_support.errors import RefusedInput, needed
 
 _NUMBER = r"([-+]?\d+(?:\.\d*)?)"
 _AZIMUTH = rf"(?:azimuth\s+(?:{_NUMBER}|(unknown))|(magnetic))"
@@ -67,14 +68,12 @@ def declination_deg(latitude_deg: float, longitude_deg: float, seconds: float) -
 
     Raises RefusedInput for a time without coefficients, near a magnetic pole, and without pygeomag.
     """
-    try:
-        from pygeomag import GeoMag
-    except ImportError:
-        raise RefusedInput("origins refused", "needs pygeomag; install it with: pip install pygeomag") from None
+    pygeomag = needed("pygeomag", "pip install pygeomag", partial(RefusedInput, "origins refused"))
     date = datetime.fromtimestamp(seconds, timezone.utc)
     year = date.year + (date.timetuple().tm_yday - 1) / 365.25
     try:
-        field = GeoMag(base_year=date).calculate(latitude_deg, longitude_deg, 0.0, year, raise_in_warning_zone=True)
+        model = pygeomag.GeoMag(base_year=date)
+        field = model.calculate(latitude_deg, longitude_deg, 0.0, year, raise_in_warning_zone=True)
     except Exception as error:  # pygeomag has no common class for a wrong year and a compass that points down
         raise RefusedInput("origins refused", f"no declination in {date.year}: {error}") from error
     return float(field.d)

@@ -1,11 +1,12 @@
 """Where the map lies on the Earth, and latitude and longitude of its points (WGS 84)."""
 
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
-from node_support.errors import RefusedInput
+from node_support.errors import RefusedInput, needed
 from node_support.geometry import rotated
 
 EAST_DEG = 90.0
@@ -93,8 +94,4 @@ class Origin:
 
 def _projection(text: str) -> Any:
     # A mapping node without an origin shall not wait for PROJ.
-    try:
-        from pyproj import Proj
-    except ImportError:
-        raise RefusedInput("origins refused", "needs pyproj; install it with: apt install python3-pyproj") from None
-    return Proj(text)
+    return needed("pyproj", "apt install python3-pyproj", partial(RefusedInput, "origins refused")).Proj(text)

@@ -1,4 +1,7 @@
-"""The exception with which a core refuses data that it cannot use, and numbers in such texts."""
+"""The exception with which a core refuses data that it cannot use, numbers in such texts, and missing libraries."""
+
+from importlib import import_module
+from typing import Any, Callable
 
 
 class RefusedInput(ValueError):  # noqa: N818 - named for what it says, it is not an error of the program
@@ -7,6 +10,14 @@ class RefusedInput(ValueError):  # noqa: N818 - named for what it says, it is no
     def __init__(self, kind: str, detail: str) -> None:
         super().__init__(detail)
         self.kind = kind
+
+
+def needed(module: str, install: str, failure: Callable[[str], Exception]) -> Any:
+    """Return a module of a library that not everybody needs; raises `failure` of how to `install` it."""
+    try:
+        return import_module(module)
+    except ImportError:
+        raise failure(f"needs {module.partition('.')[0]}; install it with: {install}") from None
 
 
 def counted(number: int, noun: str) -> str:

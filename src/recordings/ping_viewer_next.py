@@ -15,6 +15,7 @@ from typing import Any, Dict, Iterator, List, Optional, Tuple
 import numpy as np
 
 from georeferencing.fixes import Fix
+from node_support.errors import needed
 from node_support.geometry import pose_matrix, quaternion_of
 from ping360_driver.messages import MessageError, MessageId
 from ping360_driver.scan_command import Beam as HeadBeam
@@ -122,18 +123,15 @@ def _messages(path: Path, name: str) -> Iterator[Tuple[str, int, Dict[str, Any]]
 
 
 def _records(path: Path) -> Iterator[Tuple[str, int, bytes]]:
-    try:
-        from mcap.records import Channel, Message
-        from mcap.stream_reader import StreamReader
-    except ImportError:
-        raise RecordingError(f"{path}: needs the library mcap; install it with: pip install mcap") from None
+    names = "mcap.records", "mcap.stream_reader"
+    records, reader = (needed(one, "pip install mcap", lambda text: RecordingError(f"{path}: {text}")) for one in names)
     channels: Dict[int, str] = {}
     try:
         with path.open("rb") as file:
-            for record in StreamReader(file).records:
-                if isinstance(record, Channel):
+            for record in reader.StreamReader(file).records:
+                if isinstance(record, records.Channel):
                     channels[record.id] = record.topic
-                elif isinstance(record, Message):
+                elif isinstance(record, records.Message):
                     yield channels[record.channel_id], record.log_time, record.data
     except OSError as error:
         raise RecordingError(f"{path}: {error.strerror}") from None

@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 
 from mlsm_manager.offline.index_page import Job, Outcome, index_page
+from node_support.errors import needed
 from node_support.files import make_folder, write_whole
 from recordings.bags.bag import RecordingError
 from recordings.makers_logs import is_makers_log
@@ -33,16 +34,13 @@ class Cluster:
 
     def __init__(self, address: str, folder: Path) -> None:
         """`folder`: where the workers will write. Raises RecordingError for what would stop the jobs later."""
-        try:
-            from distributed import Client
-        except ImportError:
-            raise RecordingError("--scheduler needs Dask; install it with: apt install python3-distributed") from None
+        distributed = needed("distributed", "apt install python3-distributed", RecordingError)
         self._address, self._seen = address, time.monotonic()
         # A lost scheduler is told in one line; Dask's threads would add pages.
         for name in _LOGS:
             logging.getLogger(name).setLevel(logging.CRITICAL + 1)
         try:
-            self._client = Client(address, timeout=TIMEOUT)
+            self._client = distributed.Client(address, timeout=TIMEOUT)
         except (OSError, ValueError) as error:
             raise RecordingError(f"--scheduler {address}: {error or 'cannot be reached'}") from None
         try:

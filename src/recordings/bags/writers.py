@@ -6,6 +6,7 @@ from typing import Any, Dict
 from rosbags.interfaces import Connection
 from rosbags.rosbag1 import Writer
 
+from node_support.errors import needed
 from recordings.bags.bag import RecordingError
 from recordings.bags.message_types import StoreMessages, ros1_types, ros2_types
 
@@ -50,11 +51,7 @@ class BagWriter(StoreMessages):
 
 def mcap_writer() -> Any:
     """Return the library's class of writers. Raises RecordingError where it is not installed."""
-    try:
-        from mcap.writer import Writer
-    except ImportError:
-        raise RecordingError("MCAP files need the library mcap; install it with: pip install mcap") from None
-    return Writer
+    return needed("mcap.writer", "pip install mcap", lambda text: RecordingError(f"MCAP: {text}")).Writer
 
 
 class McapWriter(StoreMessages):

@@ -11,6 +11,7 @@ from typing import Any, Dict, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from georeferencing.fixes import UNKNOWN_DEVIATION, Fix
+from node_support.errors import needed
 from node_support.geometry import pose_matrix, quaternion_of
 from recordings.bags.bag import RecordingError
 from recordings.motion.frame_tree import FrameTree
@@ -132,10 +133,7 @@ def _rows(path: Path) -> Tuple[Dict[str, _Rows], int]:
 
 def _messages(path: Path, kinds: Sequence[str]) -> Iterator[Any]:
     """Yield the messages of some types. Raises RecordingError."""
-    try:
-        from pymavlink import mavutil
-    except ImportError:
-        raise RecordingError(f"{path}: needs the library pymavlink; install it with: pip install pymavlink") from None
+    mavutil = needed("pymavlink.mavutil", "pip install pymavlink", lambda text: RecordingError(f"{path}: {text}"))
     try:
         path.open("rb").close()
         log = mavutil.mavlink_connection(str(path))

@@ -10,6 +10,7 @@ from georeferencing.origin import Origin
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.rasters import counts, elevation, ridges
 from mlsm_manager.surface_map.map_file import ExportError
+from node_support.errors import needed
 from node_support.files import whole_file, write_whole
 
 _BANDS = ("highest point [m]", "number of points")
@@ -168,8 +169,6 @@ def _system(crs: str) -> Any:
 
 def _rasterio() -> Any:
     # GDAL takes a quarter of a second and 60 MB: who needs no chart shall not wait for it.
-    try:
-        import rasterio.warp
-    except ImportError:
-        raise ExportError("needs rasterio; install it with: apt install python3-rasterio") from None
-    return rasterio
+    how = "apt install python3-rasterio"
+    needed("rasterio.warp", how, ExportError)
+    return needed("rasterio", how, ExportError)

@@ -12,6 +12,7 @@ from mlsm_manager.surface_map.export.charts import write_geotiff
 from mlsm_manager.surface_map.export.pictures import ColorBy, write_picture
 from mlsm_manager.surface_map.export.rasters import elevation, occupancy, write_ascii_grid, write_map_server
 from mlsm_manager.surface_map.map_file import ENDING, ExportError, Layer, StoredMap, write_map
+from node_support.errors import needed
 from node_support.files import whole_file, write_whole
 
 GEOTIFF = ".tif"
@@ -40,10 +41,7 @@ def write_ply(path: Path, blocks: Blocks) -> None:
 
 def write_pcd(path: Path, blocks: Blocks) -> None:
     """Write a binary PCD with what `write_ply` writes, in float32. Raises ExportError without Open3D, and OSError."""
-    try:
-        import open3d
-    except ImportError:
-        raise ExportError("needs Open3D; install it with: apt install python3-open3d") from None
+    open3d = needed("open3d", "apt install python3-open3d", ExportError)
     fields = {"intensity": blocks.mean[:, 3], "bottom": blocks.bottom, "height": blocks.height}
     fields.update(
         {f"variance_{axis}": blocks.variance[:, index] for index, axis in enumerate(("x", "y", "z", "intensity"))}
@@ -117,7 +115,6 @@ _HIT, _MISS = 0.85, -0.4  # log-odds of one hit and one miss, OctoMap's own (pro
 _MOST_HITS, _MOST_MISSES = 5, 5  # more change nothing: OctoMap keeps log-odds between -2 and 3.5
 _HALF_TREE = 32768  # an OcTree has 16 levels: so many cells to each side of the origin
 _MOST_VOXELS = 100_000_000  # a tree of more takes gigabytes; one tall block of noise can ask for that
-_HOW_TO_INSTALL = "needs pyoctomap; install it with: pip install pyoctomap"
 
 
 def write_octree(path: Path, occupied: Blocks, free: Blocks) -> None:
@@ -179,7 +176,7 @@ def _empty_tree(resolution: float) -> Any:
     try:
         import pyoctomap
     except ImportError:
-        raise ExportError(_HOW_TO_INSTALL) from None
+        raise ExportError("needs pyoctomap; install it with: pip install pyoctomap") from None
     except ValueError as error:
         raise ExportError(f"pyoctomap does not load with numpy {np.__version__}; use a newer one: {error}") from error
     return pyoctomap.OcTree(resolution)

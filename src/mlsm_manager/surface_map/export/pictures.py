@@ -12,6 +12,7 @@ from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.boxes import THINNEST
 from mlsm_manager.surface_map.export.rasters import elevation
 from mlsm_manager.surface_map.map_file import ExportError
+from node_support.errors import needed
 from node_support.files import write_whole
 
 Limits = Tuple[float, float]
@@ -140,10 +141,7 @@ def box_mesh(blocks: Blocks) -> tuple:
 
 def show(blocks: Blocks, title: str, color_by: ColorBy) -> None:
     """Open the window and return when it is closed. Raises ExportError without Open3D."""
-    try:
-        import open3d
-    except ImportError:
-        raise ExportError("needs Open3D; install it with: apt install python3-open3d") from None
+    open3d = needed("open3d", "apt install python3-open3d", ExportError)
     corners, triangles = box_mesh(blocks)
     mesh = open3d.geometry.TriangleMesh(
         open3d.utility.Vector3dVector(corners), open3d.utility.Vector3iVector(triangles.astype(np.int32))
