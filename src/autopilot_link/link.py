@@ -3,6 +3,7 @@
 import socket
 import threading
 import time
+from dataclasses import replace
 from typing import Any, Callable, Optional, Tuple, Union
 
 from autopilot_link.messages import Firmware, Reader, Writer, firmware_of, is_of_autopilot
@@ -135,7 +136,7 @@ class AutopilotLink:
         obstacle = self.obstacle()
         if obstacle:
             raise RefusedInput("positions not sent", obstacle)
-        stamped = pose.stamped(pose.stamp_ns + self._time.offset_ns)
+        stamped = replace(pose, stamp_ns=pose.stamp_ns + self._time.offset_ns)
         with self._lock:
             self._write(self._writer.pose(self._system, self._firmware, self._parameters.message, stamped))
 

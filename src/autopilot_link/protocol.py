@@ -6,7 +6,7 @@ east, down. Messages: https://mavlink.io/en/messages/common.html; time: https://
 
 import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Deque, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -68,9 +68,6 @@ class StatedPose:
     def covariance_ned(self) -> np.ndarray:
         """The upper triangle (21,) of the covariance in MAVLink's axes, row by row."""
         return (_COVARIANCE_NED_ENU @ self.covariance @ _COVARIANCE_NED_ENU.T)[_UPPER]
-
-    def stamped(self, stamp_ns: int) -> "StatedPose":
-        return replace(self, stamp_ns=stamp_ns)
 
 
 def enu_of_map(azimuth_deg: float) -> np.ndarray:

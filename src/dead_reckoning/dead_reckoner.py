@@ -9,7 +9,7 @@ import numpy as np
 
 from node_support.errors import RefusedInput
 from node_support.geometry import rotated, wrapped, yaw_of
-from node_support.headers import StampParameters
+from node_support.headers import JUMP_BACK, StampParameters
 from node_support.parameters import parameter
 from node_support.timing import UsualInterval
 
@@ -87,9 +87,6 @@ class DeadReckoningParameters(StampParameters):
     odom_frame: str = parameter("odom", "frame of the dead reckoning", tunable=False)
     base_frame: str = parameter("base_link", "frame of the vehicle", tunable=False)
 
-
-JUMP_BACK = 1.0
-"""Headings whose stamps go back by more than this [s] mean that time jumped; then the vehicle starts anew."""
 
 GAPS = "gaps in the heading"
 _REFUSED_VELOCITIES = "velocities refused"

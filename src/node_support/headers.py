@@ -13,6 +13,10 @@ STAMPS_REFUSED = "stamps refused"
 DAY = 86400.0
 """A clock that is wrong by more than a day has never been set."""
 
+JUMP_BACK = 1.0
+"""Stamps that go back by more than this [s] mean that time jumped, as when a bag loops; messages overtake each other by
+less."""
+
 _NANOSECONDS = 10**9
 # tf2 takes stamps as float64 seconds, which may round up, and subtracts and returns them as signed 32 bit numbers;
 # from 2^31 s on it ends the process.

@@ -10,6 +10,7 @@ import numpy as np
 
 from georeferencing.origin import EAST_DEG
 from node_support.geometry import wrapped
+from node_support.headers import JUMP_BACK
 from node_support.marks import Mark
 from sonar_processing.beams.beam import Beam
 from web_page.board import BEAM, NOW, TILE, TRACK, WORDS, Board
@@ -17,7 +18,6 @@ from web_page.messages import Kind, Ray, beam_bytes, rows_bytes, text_of
 from web_page.parameters import WebPageParameters
 from web_page.tiles import BORN_STEP, SIDE, MapTiles
 
-JUMP_BACK = 1.0  # s: messages overtake each other by less
 _SILENCE = 5.0  # s of wall time
 _TRACK_PERIOD = 1.0  # s between two positions of the trail
 _CHUNK = 32  # rows that are sent together: few, because the newest chunk goes again with each new row

@@ -23,12 +23,12 @@ from autopilot_link.protocol import (
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry import quaternion_of
-from node_support.headers import check_stamp
+from node_support.headers import JUMP_BACK, check_stamp
 from node_support.health import SILENCE
 from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.transforms import JUMP_BACK, TfBuffer, matrix_from_message, pose_from_matrix
+from node_support.ros.transforms import TfBuffer, matrix_from_message, pose_from_matrix
 from sonar_driver.port import PortRefusedError
 from underwater_map_construction.msg import PositionStatus
 

@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, TransformStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, Imu
 from std_msgs.msg import Float64
@@ -28,7 +28,7 @@ from node_support.errors import RefusedInput
 from node_support.headers import check_frame
 from node_support.ros.callbacks import MessageClasses, guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.transforms import TfBuffer, matrix_of_quaternion, pose_from_matrix
+from node_support.ros.transforms import TfBuffer, pose_from_matrix, rotation_from_message
 
 QUEUE_SIZE = 100  # a second of a fast AHRS
 _REFUSED_HEADINGS = "headings refused"
@@ -141,7 +141,7 @@ class DeadReckoning:
         """Return R_odom_base (3, 3); raises RefusedInput for a message without an orientation."""
         if message.orientation_covariance[0] == _NO_ORIENTATION:
             raise RefusedInput(_REFUSED_HEADINGS, "the Imu says that it measures no orientation; choose another topic")
-        R_odom_imu = matrix_of_quaternion(_components(message.orientation), _REFUSED_HEADINGS)
+        R_odom_imu = rotation_from_message(message.orientation, _REFUSED_HEADINGS)
         mount = self._mount(message.header.frame_id, message.header.stamp.to_nsec())
         return R_odom_imu if mount is None else R_odom_imu @ mount[:3, :3].T
 
@@ -175,7 +175,3 @@ class DeadReckoning:
         angular.z = reckoning.turn_rate
         self._odometry.publish(odometry)
         self.health.count("transforms sent")
-
-
-def _components(quaternion: Quaternion) -> np.ndarray:
-    return np.array([quaternion.x, quaternion.y, quaternion.z, quaternion.w])

@@ -13,6 +13,7 @@ from georeferencing.fixes import fix_of
 from georeferencing.origin import Origin
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState
+from mlsm_manager.ros.fix_publisher import UNKNOWN_VARIANCE
 from mlsm_manager.ros.odometry_track import OdometryTrack
 from mlsm_manager.scan_matching.scan_path import POSITION
 from node_support import topics
@@ -20,8 +21,6 @@ from node_support.geometry import composed
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
 from sonar_processing.ros.conversions import header
-
-_UNKNOWN_VARIANCE = 1e6  # m^2, of a height that nobody measured
 
 
 class ChartPosition:
@@ -66,7 +65,7 @@ class ChartPosition:
         message.status.status = NavSatStatus.STATUS_FIX if good else NavSatStatus.STATUS_NO_FIX
         message.latitude, message.longitude = origin.degrees(pose[np.newaxis])[0].tolist()
         message.altitude = np.nan
-        covariance = np.diag(np.full(3, _UNKNOWN_VARIANCE))
+        covariance = np.diag(np.full(3, UNKNOWN_VARIANCE))
         own = self._own if self._own is not None and self._own.origin is origin else Adjusted(origin)
         covariance[:2, :2] = own.covariances(pose[np.newaxis], np.array([_variance(place)]))[0]
         message.position_covariance = covariance.ravel().tolist()

@@ -17,10 +17,10 @@ from node_support.errors import RefusedInput
 from node_support.headers import check_stamp
 from node_support.health import Health
 from node_support.ros.callbacks import every_clock_period
-from node_support.ros.transforms import matrix_of_quaternion, pose_from_matrix
+from node_support.ros.transforms import pose_from_matrix, rotation_from_message
 from sonar_processing.ros.conversions import header, point_cloud
 
-_UNKNOWN_VARIANCE = 1e6  # m^2 and rad^2: what a filter such as robot_localization takes for "not measured"
+UNKNOWN_VARIANCE = 1e6  # m^2 and rad^2: what a filter such as robot_localization takes for "not measured"
 _ROS_AXES = np.array([0, 1, 5])  # x, y and yaw among the six axes of a covariance message
 _LONGEST_PATH = 20000  # poses: four days of scans of 16 s, 1.5 MB
 
@@ -69,15 +69,14 @@ class FixPublisher:
 
 def pose_covariance(planar: np.ndarray) -> list:
     """Return the 36 entries of a message whose x, y and yaw have the covariance `planar` (3, 3)."""
-    full = np.diag(np.full(6, _UNKNOWN_VARIANCE))
+    full = np.diag(np.full(6, UNKNOWN_VARIANCE))
     full[np.ix_(_ROS_AXES, _ROS_AXES)] = planar
     return full.ravel().tolist()
 
 
 def planar_pose(message: PoseWithCovariance) -> Tuple[np.ndarray, np.ndarray]:
     """Return x, y [m] and yaw [rad] (3,) of a message, and their covariance (3, 3); raises RefusedInput for none."""
-    at, turn = message.pose.position, message.pose.orientation
-    rotation = matrix_of_quaternion(np.array([turn.x, turn.y, turn.z, turn.w]), "poses refused")
+    at, rotation = message.pose.position, rotation_from_message(message.pose.orientation, "poses refused")
     pose = np.array([at.x, at.y, np.arctan2(rotation[1, 0], rotation[0, 0])])
     covariance = np.reshape(message.covariance, (6, 6))[np.ix_(_ROS_AXES, _ROS_AXES)]
     if not np.isfinite(pose).all() or not np.isfinite(covariance).all() or np.linalg.eigvalsh(covariance)[0] <= 0.0:

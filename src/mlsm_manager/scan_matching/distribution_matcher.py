@@ -158,8 +158,6 @@ class DistributionMatcher:
     def _judge_second_places(self, best: Fit, others: List[Fit], refiner: Refiner) -> Tuple[MatchStatus, str]:
         """Reject a fix whose covariance excludes a pose of another place that fits nearly as well."""
         least = self.limits.min_gain_over_second
-        if least == 0.0:
-            return MatchStatus.CONVERGED, ""
         for other in others:
             lead = best.gain(best.inflation) - other.gain(best.inflation)
             is_apart = separation(best.theta, other.theta) >= _APART and not self._is_same_place(best, other)

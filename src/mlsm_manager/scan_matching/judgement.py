@@ -5,7 +5,7 @@ decides then is a handful of points. A scan of another place finds some of the m
 beside it, and hears echoes from behind surfaces that the map has in between.
 """
 
-from typing import Callable, NamedTuple, Tuple
+from typing import Callable, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -50,15 +50,9 @@ def lead_along(gains: OfMoves, direction: np.ndarray, nearest: float) -> float:
     return float(found[0] - found[1:].max(initial=-np.inf))
 
 
-class Agreement(NamedTuple):
-    """How far a scan lies on a map. explained: share of all echoes that lie on it. agreed: see `agreement`."""
-
-    explained: float
-    agreed: float
-
-
-def agreement(points: np.ndarray, on_map: np.ndarray, position: np.ndarray, blocks: np.ndarray) -> Agreement:
-    """Return how far a scan lies on a map; agreed: share of echoes that the map explains times that of blocks heard.
+def agreement(points: np.ndarray, on_map: np.ndarray, position: np.ndarray, blocks: np.ndarray) -> Tuple[float, float]:
+    """Return the share of echoes that lie on a map; and how far scan and map agree: the share of echoes that the map
+    explains times that of blocks heard.
 
     points: (n, 2) m in map, n > 0, and which of them lie `on_map` (n,) bool. position: (2,) of the sonar. blocks:
     (m, 2) m in map, m > 0; those farther than nine tenths of the points are not expected to be heard.
@@ -79,7 +73,7 @@ def agreement(points: np.ndarray, on_map: np.ndarray, position: np.ndarray, bloc
     inside = block_range < np.quantile(ranges, _REACH_QUANTILE)
     heard = inside & (distances < tolerance)
     denied = inside & ~heard & (block_range < first - tolerance) & np.isfinite(first)
-    return Agreement(float(on_map.mean()), _share(on_map, comparable) * _share(heard, heard | denied))
+    return float(on_map.mean()), _share(on_map, comparable) * _share(heard, heard | denied)
 
 
 def _share(of: np.ndarray, among: np.ndarray) -> float:

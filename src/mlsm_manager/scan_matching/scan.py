@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Optional, Protocol, Sequence, Union
+from typing import Optional, Protocol, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -55,9 +55,9 @@ class Track:
         columns = [np.interp(times, self.times, self.poses[:, axis]) for axis in range(3)]
         return np.stack(columns, axis=-1)
 
-    def velocity_at(self, time: float, window: float = 1.0) -> np.ndarray:
-        """Return the (3,) velocity in the body frame, m/s, m/s, rad/s, over up to `window` s that end at `time`."""
-        first = max(time - window, self.times[0])
+    def velocity_at(self, time: float) -> np.ndarray:
+        """Return the (3,) velocity in the body frame, m/s, m/s, rad/s, over up to a second that ends at `time`."""
+        first = max(time - 1.0, self.times[0])
         last = min(time, self.times[-1])
         if last <= first:
             return np.zeros(3)
@@ -102,10 +102,8 @@ class Scan:
 
         Points that are not finite are left out.
         """
-        points = np.asarray(points, dtype=np.float64)
-        stamps = np.asarray(time_stamps, dtype=np.float64)
-        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
-        return cls(points[valid], np.abs(stamps[valid]), stamps[valid] > 0.0, track, reference_time)
+        points, stamps = _finite(points, time_stamps)
+        return cls(points, np.abs(stamps), stamps > 0.0, track, reference_time)
 
     def __len__(self) -> int:
         return len(self.points)
@@ -149,10 +147,8 @@ class MapCloud:
     @classmethod
     def from_stamps(cls, points: np.ndarray, time_stamps: np.ndarray, end: float) -> "MapCloud":
         """Build from a cloud's points (n, 4) and signed time stamps (n,); points that are not finite are left out."""
-        points = np.asarray(points, dtype=np.float64)
-        stamps = np.asarray(time_stamps, dtype=np.float64)
-        valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
-        return cls(points[valid], np.abs(stamps[valid]), end)
+        points, stamps = _finite(points, time_stamps)
+        return cls(points, np.abs(stamps), end)
 
     @classmethod
     def of_scan(cls, scan: Scan) -> "MapCloud":
@@ -166,6 +162,13 @@ class MapCloud:
 
     def __len__(self) -> int:
         return len(self.points)
+
+
+def _finite(points: np.ndarray, time_stamps: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return points (n, 4) and their time stamps (n,), both finite, as float64."""
+    points, stamps = np.asarray(points, dtype=np.float64), np.asarray(time_stamps, dtype=np.float64)
+    valid = np.isfinite(points).all(axis=1) & np.isfinite(stamps)
+    return points[valid], stamps[valid]
 
 
 class MatchStatus(Enum):

@@ -17,7 +17,7 @@ from tf2_msgs.msg import TFMessage
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.geometry import quaternion_of, rotation_matrices
-from node_support.headers import DAY, check_frame, check_stamp
+from node_support.headers import DAY, JUMP_BACK, check_frame, check_stamp
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
 
@@ -50,9 +50,6 @@ class StandingClock:
     def stands_at(self, stamp_ns: int) -> bool:
         return any(changes >= _FEWEST and stamp <= stamp_ns for stamp, _, changes in list(self._newest.values()))
 
-
-JUMP_BACK = 1.0
-"""Stamps that go back by more than this [s] mean that time jumped; messages overtake each other by less."""
 
 _KIND = "transforms refused"
 _QUEUE_SIZE = 1000  # some seconds of a busy /tf, while a slow callback holds the others up
@@ -244,15 +241,15 @@ def matrix_from_message(transform: Transform) -> np.ndarray:
     translation = np.array([shift.x, shift.y, shift.z])
     if not np.isfinite(translation).all():
         raise RefusedInput(_KIND, f"translation {translation}, must be finite")
-    quaternion = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
     matrix = np.eye(4)
-    matrix[:3, :3] = matrix_of_quaternion(quaternion, _KIND)
+    matrix[:3, :3] = rotation_from_message(rotation, _KIND)
     matrix[:3, 3] = translation
     return matrix
 
 
-def matrix_of_quaternion(quaternion: np.ndarray, kind: str) -> np.ndarray:
-    """Return the (3, 3) rotation of a quaternion (4,), x y z w; raises RefusedInput, as `kind`, when it is none."""
+def rotation_from_message(rotation: Quaternion, kind: str) -> np.ndarray:
+    """Return the (3, 3) matrix of a rotation; raises RefusedInput, as `kind`, when it is none."""
+    quaternion = np.array([rotation.x, rotation.y, rotation.z, rotation.w])
     norm = np.linalg.norm(quaternion)
     if not 0.5 < norm < 2.0:
         raise RefusedInput(kind, f"quaternion {quaternion}, must be of length 1")

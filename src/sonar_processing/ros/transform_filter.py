@@ -14,10 +14,10 @@ from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
 from node_support.errors import RefusedInput
 from node_support.geometry import quaternion_of
-from node_support.headers import DAY
+from node_support.headers import DAY, JUMP_BACK
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
-from node_support.ros.transforms import JUMP_BACK, TfBuffer
+from node_support.ros.transforms import TfBuffer
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.beam_queue import BeamQueue, WaitingBeam
 from sonar_processing.beams.parameters import MountingParameters

@@ -7,12 +7,11 @@ from typing import Callable, List, Optional
 
 import numpy as np
 
+from node_support.headers import JUMP_BACK
 from node_support.health import Health
 from node_support.parameters import ParameterError, parameter
 from sonar_processing.beams.head import SweepCounter
 from sonar_processing.beams.reader import BeamMessageParameters
-
-JUMP_BACK = 1.0  # s: messages overtake each other by less; more is a bag that loops
 
 
 class ControlMode(Enum):

@@ -2,6 +2,7 @@
 
 import math
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -58,7 +59,7 @@ def test_a_position_arrives_in_the_autopilots_axes_and_time(opened):
     link, _, _, peer = opened({})
     wait_until(lambda: not link.obstacle())
     stamp = time.monotonic_ns()
-    got = _sent(link, peer, pose=POSE.stamped(stamp))
+    got = _sent(link, peer, pose=replace(POSE, stamp_ns=stamp))
     np.testing.assert_allclose([got.x, got.y, got.z, *got.q], [2.0, 1.0, 3.0, 1.0, 0.0, 0.0, 0.0], atol=1e-6)
     assert (got.frame_id, got.child_frame_id) == (mavlink.MAV_FRAME_LOCAL_FRD, mavlink.MAV_FRAME_BODY_FRD)
     assert (got.vx, got.reset_counter) == (0.5, 7)
@@ -131,7 +132,7 @@ def test_a_lost_autopilot_is_told_and_comes_back_with_its_new_clock(opened, monk
     again = Peer(link.name, ahead_ns=-AHEAD_NS)
     wait_until(lambda: not link.obstacle())
     stamp = time.monotonic_ns()
-    got = _sent(link, again, pose=POSE.stamped(stamp + 2 * AHEAD_NS))
+    got = _sent(link, again, pose=replace(POSE, stamp_ns=stamp + 2 * AHEAD_NS))
     assert abs(got.time_usec * 1000 - stamp - AHEAD_NS) < 0.5e9
     again.close()
 

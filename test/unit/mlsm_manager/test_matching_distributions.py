@@ -203,7 +203,7 @@ HERE = np.zeros(2)
 
 
 def agreed(points, on_map, blocks):
-    return agreement(points, np.broadcast_to(on_map, len(points)), HERE, blocks).agreed
+    return agreement(points, np.broadcast_to(on_map, len(points)), HERE, blocks)[1]
 
 
 def test_a_scan_of_the_mapped_place_agrees_wholly():
