@@ -75,25 +75,39 @@ class MapMarks:
         self._shown.publish(MarkerArray(markers))
 
 
+class KeptMap:
+    """The localiser's map and its marks, as files of map_directory hold them."""
+
+    def __init__(self, localiser: Localiser, parameters: MlsmCoreParameters, marks: MapMarks) -> None:
+        self.localiser, self.parameters, self.marks = localiser, parameters, marks
+        self.folder = MapFolder(parameters.map_directory)
+
+    def stored(self, run: str = "") -> StoredMap:
+        """Return the present map; run: see `Autosave`."""
+        stored = self.localiser.stored(self.parameters.map_frame, self.parameters.calibration, time.time(), run)
+        return replace(stored, marks=self.marks.all())
+
+    def take(self, stored: StoredMap, same_odometry: bool = False) -> str:
+        """Take a stored map in the place of the present one; return why its run cannot go on, else nothing.
+
+        Raises ValueError for a map of another frame or resolution.
+        """
+        if stored.frame != self.parameters.map_frame:
+            raise ValueError(f"frame {stored.frame!r}: must be the map's, {self.parameters.map_frame!r}")
+        reason = self.localiser.restore(stored, same_odometry)
+        self.marks.replace(stored.marks)
+        return reason
+
+
 class MapServices:
     """Serves save_map, load_map, reset_map, get_region and relocalise in the namespace of mlsm_core."""
 
     def __init__(
-        self,
-        namespace: str,
-        localiser: Localiser,
-        parameters: MlsmCoreParameters,
-        marks: MapMarks,
-        on_replaced: Callable[[], None],
-        on_fix: Callable[[ScanUpdate], None],
+        self, namespace: str, kept: KeptMap, on_replaced: Callable[[], None], on_fix: Callable[[ScanUpdate], None]
     ) -> None:
         """`on_replaced` is called after the map was cleared or loaded, `on_fix` with the scan whose pose was found."""
-        self._localiser = localiser
-        self._parameters = parameters
-        self._marks = marks
-        self._folder = MapFolder(parameters.map_directory)
-        self._on_replaced = on_replaced
-        self._on_fix = on_fix
+        self._kept, self._localiser, self._parameters = kept, kept.localiser, kept.parameters
+        self._on_replaced, self._on_fix = on_replaced, on_fix
         prefix = namespace if namespace == "~" else namespace + "/"
         rospy.Service(f"{prefix}save_map", srv.SaveMap, self._save)
         rospy.Service(f"{prefix}load_map", srv.LoadMap, self._load)
@@ -102,18 +116,16 @@ class MapServices:
         rospy.Service(f"{prefix}relocalise", Trigger, self._relocalise)
 
     def _save(self, request: srv.SaveMapRequest) -> srv.SaveMapResponse:
-        stored = stored_map(self._localiser, self._parameters, self._marks)
+        stored = self._kept.stored()
         try:
-            path = self._folder.save(request.name, stored, request.overwrite)
+            path = self._kept.folder.save(request.name, stored, request.overwrite)
         except (OSError, ValueError) as error:
             return srv.SaveMapResponse(False, str(error))
         return srv.SaveMapResponse(True, f"{len(stored.shown)} blocks written to {path}")
 
     def _load(self, request: srv.LoadMapRequest) -> srv.LoadMapResponse:
         try:
-            stored = self._folder.load(request.name)
-            load_into(self._localiser, stored, self._parameters, same_odometry=False)
-            self._marks.replace(stored.marks)
+            self._kept.take(self._kept.folder.load(request.name))
         except ValueError as error:
             return srv.LoadMapResponse(False, f"{error}; the present map stays")
         self._on_replaced()
@@ -121,7 +133,7 @@ class MapServices:
 
     def _reset(self, _request: TriggerRequest) -> TriggerResponse:
         count = self._localiser.clear()
-        self._marks.replace(())
+        self._kept.marks.replace(())
         self._on_replaced()
         return TriggerResponse(True, f"{count} blocks deleted")
 
@@ -152,33 +164,13 @@ def _left_out(turns: int) -> str:
     return f"; the {turns} turns of the head since the silence, which lay apart, are left out of it" if turns else ""
 
 
-def stored_map(localiser: Localiser, parameters: MlsmCoreParameters, marks: MapMarks, run: str = "") -> StoredMap:
-    stored = localiser.stored(parameters.map_frame, parameters.calibration, time.time(), run)
-    return replace(stored, marks=marks.all())
-
-
-def load_into(localiser: Localiser, stored: StoredMap, parameters: MlsmCoreParameters, same_odometry: bool) -> str:
-    """Take a stored map in the place of the present one; return why its run cannot go on, else nothing.
-
-    Raises ValueError for a map of another frame or resolution.
-    """
-    if stored.frame != parameters.map_frame:
-        raise ValueError(f"frame {stored.frame!r}: must be the map's, {parameters.map_frame!r}")
-    return localiser.restore(stored, same_odometry)
-
-
 class Autosave:
     """One file for each node in map_directory, and the last one of the run before under another name."""
 
-    def __init__(
-        self, namespace: str, localiser: Localiser, parameters: MlsmCoreParameters, marks: MapMarks, health: Health
-    ) -> None:
+    def __init__(self, namespace: str, kept: KeptMap, health: Health) -> None:
         """Load what a node of this name saved in this run of roslaunch, and save from now on."""
-        self._localiser = localiser
-        self._parameters = parameters
-        self._marks = marks
-        self._health = health
-        self._folder = MapFolder(parameters.map_directory)
+        parameters = kept.parameters
+        self._kept, self._localiser, self._folder, self._health = kept, kept.localiser, kept.folder, health
         self._name = rospy.resolve_name(namespace).strip("/").replace("/", ".") + ".autosave"
         self._run = _run_of_roslaunch()
         self._saved_at = self._changes()
@@ -194,9 +186,7 @@ class Autosave:
         if changes == self._saved_at or not self._localiser.block_count:
             return
         try:
-            self._folder.save(
-                self._name, stored_map(self._localiser, self._parameters, self._marks, self._run), overwrite=True
-            )
+            self._folder.save(self._name, self._kept.stored(self._run), overwrite=True)
         except (OSError, ValueError) as error:
             self._health.problem("maps not saved", f"{error}; the map would be lost if the node were killed")
             return
@@ -204,7 +194,7 @@ class Autosave:
         self._health.count("maps saved")
 
     def _changes(self) -> Tuple[int, int]:
-        return self._localiser.changes, self._marks.changes
+        return self._localiser.changes, self._kept.marks.changes
 
     def _start_in(self, name: str) -> None:
         """Load the map that the user named. Raises ParameterError where that cannot be done."""
@@ -212,28 +202,25 @@ class Autosave:
         if path.is_absolute() and path.parent == self._folder.folder:
             name = path.name
         try:
-            stored = self._folder.load(name)
-            load_into(self._localiser, stored, self._parameters, same_odometry=False)
-            self._marks.replace(stored.marks)
+            self._kept.take(self._folder.load(name))
         except ValueError as error:
-            raise ParameterError(f"map = {self._parameters.map!r}: {error}") from None
+            raise ParameterError(f"map = {self._kept.parameters.map!r}: {error}") from None
         rospy.loginfo("%s: starts in %s, %d blocks", self._health.name, name, self._localiser.block_count)
 
     def _resumed(self) -> bool:
         """Load what this node saved in this run of roslaunch; put aside what another run left."""
-        if self._parameters.autosave_period == 0.0 or not self._folder.path(self._name).exists():
+        if self._kept.parameters.autosave_period == 0.0 or not self._folder.path(self._name).exists():
             return False
         try:
             stored = self._folder.load(self._name)
             if not self._run or stored.run != self._run:
                 self._folder.put_aside(self._name)
                 return False
-            reason = load_into(self._localiser, stored, self._parameters, same_odometry=True)
+            reason = self._kept.take(stored, same_odometry=True)
         except (OSError, ValueError) as error:
             self._health.problem("maps not resumed", f"{error}; a new map begins, the file is put aside")
             self._folder.put_aside(self._name)
             return False
-        self._marks.replace(stored.marks)
         if reason:
             detail = f"{reason}; its map is kept, and the vehicle is searched in it"
             self._health.problem("runs not resumed", detail)

@@ -22,7 +22,7 @@ from mlsm_manager.localisation.updates import (
 from mlsm_manager.ros.chart_position import ChartPosition
 from mlsm_manager.ros.fix_publisher import FixPublisher, MapTransform, planar_pose
 from mlsm_manager.ros.map_publisher import MapPublisher
-from mlsm_manager.ros.map_services import Autosave, MapMarks, MapServices
+from mlsm_manager.ros.map_services import Autosave, KeptMap, MapMarks, MapServices
 from mlsm_manager.ros.odometry_track import OdometryTrack, planar
 from mlsm_manager.ros.status_teller import StatusTeller
 from mlsm_manager.scan_matching.scan import MapCloud, Scan
@@ -62,8 +62,8 @@ class MlsmCore:
         self._mounted = False
         self._steps_told = 0
         self._z_down = ZDownSigns()
-        marks = MapMarks(parameters.map_frame, self.health)
-        self._autosave = Autosave(namespace, self._localiser, parameters, marks, self.health)
+        kept = KeptMap(self._localiser, parameters, MapMarks(parameters.map_frame, self.health))
+        self._autosave = Autosave(namespace, kept, self.health)
         self._map = MapPublisher(parameters, self._localiser, self.health)
         self._fix = FixPublisher(parameters.map_frame, parameters.base_frame)
         self._transform = MapTransform(lambda: self._live.current, self._correction, self.health)
@@ -75,7 +75,7 @@ class MlsmCore:
         )
         # A scan of some minutes ago is placed, though tf no longer knows where the odometry was: the service succeeds.
         found = guarded(self.health, self._publish_found)
-        self._services = MapServices(namespace, self._localiser, parameters, marks, self._after_replacing, found)
+        self._services = MapServices(namespace, kept, self._after_replacing, found)
         seen = guarded(self.health, self._expect)
         rospy.Subscriber(topics.SEEN_POSE, PoseWithCovarianceStamped, seen, queue_size=10)
         rospy.Service(topics.DYNAMIC_MAP, GetMap, lambda _request: GetMapResponse(self._map.grid()))
