@@ -31,11 +31,14 @@ _ROUNDING_VARIANCE = 1e-3  # m^2: of a step, so that steps of no duration do not
 
 
 @dataclass(frozen=True)
-class DvlOdometry:
-    """How wrong an odometry of DVL and compass may be.
+class PositionOdometry:
+    """How wrong an odometry may be of DVL and compass, or one that was reckoned from the commands of the thrusters.
 
     position_walk: m/sqrt(s), integrated noise of its velocities. direction: rad from reported to true motion, as known
     beforehand, direction_walk: rad/sqrt(s). scale: true over reported distance minus 1, as known beforehand.
+
+    The speed that a command means changes with the battery and with what hangs on the vehicle; a current carries it
+    along. scale_walk: 1/sqrt(s). current_deviation: m/s in each direction. current_walk: m/s/sqrt(s).
     """
 
     compass: Compass
@@ -45,19 +48,9 @@ class DvlOdometry:
     direction_walk: float
     scale: float
     scale_deviation: float
-
-
-@dataclass(frozen=True)
-class ThrusterOdometry(DvlOdometry):
-    """How wrong a motion may be that was reckoned from the commands of the thrusters.
-
-    The speed that a command means changes with the battery and with what hangs on the vehicle; a current carries it
-    along. scale_walk: 1/sqrt(s). current_deviation: m/s in each direction. current_walk: m/s/sqrt(s).
-    """
-
-    scale_walk: float
-    current_deviation: float
-    current_walk: float
+    scale_walk: float = 0.0
+    current_deviation: float = HELD_DEVIATION
+    current_walk: float = 0.0
 
 
 class DvlFactors(OdometryModel):
@@ -71,15 +64,14 @@ class DvlFactors(OdometryModel):
     _carriers = 0
     """1 where the velocities after the scale carry the vehicle along, which the odometry cannot feel."""
 
-    def __init__(self, parameters: DvlOdometry) -> None:
+    def __init__(self, parameters: PositionOdometry) -> None:
         self._parameters, self.compass = parameters, parameters.compass
         self.distance_deviation, self.position_walk = parameters.scale_deviation, parameters.position_walk
         self._walks = {DIRECTION: parameters.direction_walk, SCALE: 0.0}
 
     @property
     def freed(self) -> "ThrusterFactors":
-        still = {"scale_walk": 0.0, "current_deviation": HELD_DEVIATION, "current_walk": 0.0}
-        return ThrusterFactors(ThrusterOdometry(**vars(self._parameters), **still)).freed
+        return ThrusterFactors(self._parameters).freed
 
     @property
     def calibrated(self) -> Dict[str, int]:
@@ -144,21 +136,21 @@ class ThrusterFactors(DvlFactors):
     width = 7
     _carriers = 1
 
-    def __init__(self, parameters: ThrusterOdometry) -> None:
+    def __init__(self, parameters: PositionOdometry) -> None:
         super().__init__(parameters)
-        self._own, current = parameters, parameters.current_walk
+        current = parameters.current_walk
         self._walks.update({SCALE: parameters.scale_walk, CURRENT_X: current, CURRENT_Y: current})
 
     @property
     def freed(self) -> "ThrusterFactors":
         scale = {"scale_deviation": _FREED_SCALE, "scale_walk": _FREED_SCALE_WALK}
-        return ThrusterFactors(replace(self._own, compass=self._own.compass.freed, **scale))
+        return ThrusterFactors(replace(self._parameters, compass=self.compass.freed, **scale))
 
     def first_node(self) -> np.ndarray:
         return np.append(super().first_node(), [0.0, 0.0])
 
     def first_deviations(self) -> np.ndarray:
-        current = max(self._own.current_deviation, HELD_DEVIATION)
+        current = max(self._parameters.current_deviation, HELD_DEVIATION)
         return np.append(super().first_deviations(), [current, current])
 
     def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
@@ -198,11 +190,8 @@ class UnsureFactors(ThrusterFactors):
     Scale and current do not walk within the window of the live solver, nor within a run that is refined.
     """
 
-    def __init__(self, dvl: DvlOdometry, doubt: OdometryDoubt) -> None:
-        own = {**vars(dvl), "scale_deviation": doubt.scale_deviation}
-        super().__init__(
-            ThrusterOdometry(**own, scale_walk=0.0, current_deviation=doubt.current_deviation, current_walk=0.0)
-        )
+    def __init__(self, dvl: PositionOdometry, doubt: OdometryDoubt) -> None:
+        super().__init__(replace(dvl, scale_deviation=doubt.scale_deviation, current_deviation=doubt.current_deviation))
         self.rival = DvlFactors(dvl)
         still, flowing = doubt.no_current, doubt.current_deviation
         share = (1.0 - doubt.dvl_share) / 2.0

@@ -47,16 +47,6 @@ class PriorComponent(NamedTuple):
     deviations: np.ndarray
 
 
-class Judgement(NamedTuple):
-    """log_probabilities: (c,) of the components.
-
-    term: what makes of what is known without the mixture what is known with it, in mean and covariance.
-    """
-
-    log_probabilities: np.ndarray
-    term: PriorTerm
-
-
 @dataclass(frozen=True)
 class PriorMixture:
     """The prior of the unknowns in node columns `columns` (k,): one of the components, nobody knows which.
@@ -92,8 +82,8 @@ class PriorMixture:
         """What is known without any echo."""
         return Gaussian(self.mean, np.diag(self.widest**2))
 
-    def judged(self, known: Gaussian) -> Judgement:
-        """Return how probable the components are where the widest prior and all echoes say `known`."""
+    def term(self, known: Gaussian) -> PriorTerm:
+        """Return what makes of what is known by widest prior and all echoes what is known with the mixture."""
         posteriors, log_weights = zip(*(self._posterior(known, component) for component in self.components))
         logs = np.array(log_weights) - np.logaddexp.reduce(log_weights)
         weights = np.exp(logs) * self._admitted(known)
@@ -103,7 +93,7 @@ class PriorMixture:
         apart = means - mean
         covariance = sum(weight * own.covariance for weight, own in zip(weights, posteriors))
         covariance = covariance + np.einsum("c,ca,cb->ab", weights, apart, apart)
-        return Judgement(logs, _term_between(known, Gaussian(mean, covariance)))
+        return _term_between(known, Gaussian(mean, covariance))
 
     def _admitted(self, known: Gaussian) -> np.ndarray:
         """Return which components (c,) may be assumed: narrow ones once the echoes tell what they are narrow in."""
@@ -121,7 +111,7 @@ class PriorMixture:
 
     def likeliest(self, known: Gaussian) -> PriorComponent:
         """Return the component that is the most probable where the widest prior and all echoes say `known`."""
-        return self.components[int(np.argmax(self.judged(known).log_probabilities))]
+        return max(self.components, key=lambda component: self._posterior(known, component)[1])
 
     def _posterior(self, known: Gaussian, component: PriorComponent) -> Tuple[Gaussian, float]:
         """Return what is known if a component is the prior, and the logarithm of its probability times a constant."""
@@ -147,7 +137,7 @@ class AdaptedPrior:
         self._mixture, self.term = mixture, PriorTerm.none(0)
         self._is_added = False
         if mixture is not None:
-            self.term = term or mixture.judged(mixture.before).term
+            self.term = term or mixture.term(mixture.before)
 
     def add(
         self, equations: NormalEquations, start: int, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]
@@ -161,7 +151,7 @@ class AdaptedPrior:
         own = np.array(self._mixture.columns)
         if self._is_added:
             found = Gaussian(node[own], covariance(start + own))
-            self.term = self._mixture.judged(self.term.removed_from(found)).term
+            self.term = self._mixture.term(self.term.removed_from(found))
         self._is_added = True
         self.term.add(equations, start + own, node[own])
 

@@ -1,6 +1,6 @@
 """Which odometry a vehicle has: for each kind its model of the motion, and where the values of its parameters are."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
 from typing import Any, Callable, Dict, Mapping, Optional
@@ -13,10 +13,9 @@ from mlsm_manager.joint_solver.motion_models import Compass, OdometryModel
 from mlsm_manager.joint_solver.parameters import NodeSearch
 from mlsm_manager.joint_solver.position_models import (
     DvlFactors,
-    DvlOdometry,
     OdometryDoubt,
+    PositionOdometry,
     ThrusterFactors,
-    ThrusterOdometry,
     UnsureFactors,
 )
 from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
@@ -129,17 +128,17 @@ def _compass(own: OdometryChoice) -> Compass:
     )
 
 
-def _positions(own: OdometryChoice) -> Dict[str, Any]:
+def _positions(own: OdometryChoice) -> PositionOdometry:
     """Return the walks that errors add up to which last `rate_correlation_time`, and `motion_correlation_time`."""
-    return {
-        "compass": _compass(own),
-        "position_walk": max(own.speed_deviation * np.sqrt(2.0 * own.rate_correlation_time), 1e-3),
-        "direction": own.odometry_direction,
-        "direction_deviation": own.direction_deviation,
-        "direction_walk": min(own.direction_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0),
-        "scale": own.odometry_scale,
-        "scale_deviation": own.scale_deviation,
-    }
+    return PositionOdometry(
+        compass=_compass(own),
+        position_walk=max(own.speed_deviation * np.sqrt(2.0 * own.rate_correlation_time), 1e-3),
+        direction=own.odometry_direction,
+        direction_deviation=own.direction_deviation,
+        direction_walk=min(own.direction_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0),
+        scale=own.odometry_scale,
+        scale_deviation=own.scale_deviation,
+    )
 
 
 def _speeds(own: OdometryChoice) -> Speeds:
@@ -156,7 +155,7 @@ def _speeds(own: OdometryChoice) -> Speeds:
 def _thrusters(own: OdometryChoice) -> OdometryModel:
     scale_walk = min(own.scale_deviation * np.sqrt(2.0 / own.motion_correlation_time), 1.0)
     current = {"current_deviation": own.current_deviation, "current_walk": own.current_walk}
-    return ThrusterFactors(ThrusterOdometry(**_positions(own), scale_walk=scale_walk, **current))
+    return ThrusterFactors(replace(_positions(own), scale_walk=scale_walk, **current))
 
 
 def _heading(own: OdometryChoice) -> OdometryModel:
@@ -169,8 +168,8 @@ def _none(own: OdometryChoice) -> OdometryModel:
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {
-    OdometryKind.AUTO: lambda own: UnsureFactors(DvlOdometry(**_positions(own)), _DOUBT),
-    OdometryKind.DVL: lambda own: DvlFactors(DvlOdometry(**_positions(own))),
+    OdometryKind.AUTO: lambda own: UnsureFactors(_positions(own), _DOUBT),
+    OdometryKind.DVL: lambda own: DvlFactors(_positions(own)),
     OdometryKind.THRUSTERS: _thrusters,
     OdometryKind.HEADING: _heading,
     OdometryKind.HOVERING: _heading,

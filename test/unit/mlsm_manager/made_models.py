@@ -10,18 +10,18 @@ from mlsm_manager.joint_solver.motion_models import Compass
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.position_models import DvlFactors, DvlOdometry, ThrusterFactors, ThrusterOdometry
+from mlsm_manager.joint_solver.position_models import DvlFactors, PositionOdometry, ThrusterFactors
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
 
 COMPASS = Compass(heading_deviation=0.01745, heading_correlation_time=300.0, heading_walk=0.00035)
-DVL_ODOMETRY = DvlOdometry(
+DVL_ODOMETRY = PositionOdometry(
     COMPASS, position_walk=0.12, direction=0.0, direction_deviation=0.105, direction_walk=0.0014, scale=0.0,
     scale_deviation=0.01,
 )  # fmt: skip
-THRUSTER_ODOMETRY = ThrusterOdometry(
-    **{**vars(DVL_ODOMETRY), "scale_deviation": 0.3}, scale_walk=0.005, current_deviation=0.05, current_walk=0.002
+THRUSTER_ODOMETRY = replace(
+    DVL_ODOMETRY, scale_deviation=0.3, scale_walk=0.005, current_deviation=0.05, current_walk=0.002
 )
 SPEEDS = Speeds(
     start_speed_deviation=0.3, speed_deviation=0.1, speed_correlation_time=40.0, travel_walk=0.005,

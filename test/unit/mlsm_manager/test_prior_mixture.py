@@ -41,7 +41,7 @@ def integrated(mean, deviation):
 @pytest.mark.parametrize(("mean", "deviation"), [(0.0, 0.08), (0.03, 0.05), (0.3, 0.05), (-0.3, 0.03), (0.01, 0.02)])
 def test_with_the_term_the_unknown_has_mean_and_variance_of_the_mixture(mean, deviation):
     before = known(mean, deviation)
-    found = with_term(before, MIXTURE.judged(before).term)
+    found = with_term(before, MIXTURE.term(before))
     np.testing.assert_allclose(found, integrated(mean, deviation), rtol=1e-3, atol=1e-6)
 
 
@@ -52,7 +52,7 @@ def test_of_an_unknown_of_which_all_components_know_the_same_rounding_decides_no
     mixture = PriorMixture((0, 1), np.zeros(2), widest, widest, np.zeros(2), components, MIXTURE.rival)
     spread = rng.normal(size=(2, 2)) * 0.03
     covariance, mean = spread @ spread.T + 1e-4 * np.eye(2), 0.02 * rng.normal(size=2)
-    terms = [mixture.judged(Gaussian(mean, covariance * (1.0 + 1e-14 * each))).term for each in range(10)]
+    terms = [mixture.term(Gaussian(mean, covariance * (1.0 + 1e-14 * each))) for each in range(10)]
     np.testing.assert_allclose([term.vector for term in terms], np.tile(terms[0].vector, (10, 1)), rtol=1e-6, atol=1e-6)
 
 
@@ -70,13 +70,13 @@ def test_a_rival_leads_by_the_ratio_of_the_likelihoods_of_all_echoes(mean):
 
 
 def test_a_narrow_prior_does_not_count_before_the_echoes_tell_the_unknown():
-    term = MIXTURE.judged(known(0.0, 0.12)).term
+    term = MIXTURE.term(known(0.0, 0.12))
     np.testing.assert_allclose([term.information[0, 0], term.vector[0]], 0.0, atol=1e-9)
 
 
 def test_what_lies_between_two_peaks_is_not_made_more_certain():
     between = known(0.06, 0.014)
-    assert MIXTURE.judged(between).term.information[0, 0] == 0.0
+    assert MIXTURE.term(between).information[0, 0] == 0.0
 
 
 @pytest.mark.parametrize(("information", "vector"), [(0.0, 0.0), (1e4, 3.0)])
