@@ -40,9 +40,6 @@ class EmulatorParameters(EmulatedHeadParameters):
     overrun: float = parameter(0.0, "share of replies that report a character overrun", low=0.0, high=1.0)
     head_id: int = parameter(SONAR_HEAD_ID, "number of the head", low=HEAD_IDS[0], high=HEAD_IDS[-1], tunable=False)
 
-    def timing(self) -> LineTiming:
-        return LineTiming(self.baud_rate, self.speed_of_sound)
-
 
 class HeadRotation:
     """The transducer's position, in the head's units (0.15 deg, clockwise, 1400 ahead).

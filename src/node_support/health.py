@@ -25,9 +25,9 @@ class Level(IntEnum):
 
 @dataclass(frozen=True)
 class HealthReport:
-    """One stage's state: a level, one line in words and the counters behind it."""
+    """One stage's state: a level (3, which is no Level, where it is stale), one line, and the counters behind it."""
 
-    level: Level
+    level: int
     text: str
     values: Dict[str, str]
 

@@ -5,7 +5,7 @@ The table itself is yaml/nodes.yaml.
 
 from dataclasses import dataclass
 from enum import Enum
-from typing import Any, Dict, Sequence, Tuple
+from typing import Dict, Sequence, Tuple
 
 import yaml
 
@@ -38,10 +38,6 @@ class NodeDescription:
     summary: str
     interfaces: Tuple[Interface, ...]
 
-    @classmethod
-    def of(cls, row: Dict[str, Any]) -> "NodeDescription":
-        return cls(row["summary"], tuple(_interface(*fields) for fields in row["interfaces"]))
-
 
 @dataclass(frozen=True)
 class HostDescription:
@@ -59,7 +55,10 @@ def _interface(role: str, name: str, kind: str, text: str) -> Interface:
 _TABLE = yaml.load(
     (package_folder() / "yaml/nodes.yaml").read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 )
-NODES: Dict[str, NodeDescription] = {name: NodeDescription.of(row) for name, row in _TABLE["nodes"].items()}
+NODES: Dict[str, NodeDescription] = {
+    name: NodeDescription(row["summary"], tuple(_interface(*fields) for fields in row["interfaces"]))
+    for name, row in _TABLE["nodes"].items()
+}
 HOSTS: Dict[str, HostDescription] = {name: HostDescription(**row) for name, row in _TABLE["hosts"].items()}
 DIAGNOSTICS = Interface(
     Role.OUTPUT, "/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second"

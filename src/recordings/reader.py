@@ -133,12 +133,12 @@ def _offset(recorded: RecordedBeams, tree: FrameTree, request: Request, notes: L
         return request.offset or 0.0
     names, now = request.motion, np.zeros(1, dtype=np.int64)
     mount = tree.poses(names.base_frame, recorded.beams[0].frame_id, now)[0][0]
-    found = clock_offset(recorded.beams, tree.tracks[(names.odom_frame, names.base_frame)], mount)
+    seconds, deviation = clock_offset(recorded.beams, tree.tracks[(names.odom_frame, names.base_frame)], mount)
     notes.append(
-        f"by the echoes the clock of {request.vehicle.name} is {found.seconds:.2f} s ahead of that of the beams, "
-        f"deviation {found.deviation:.2f} s (--offset sets it)"
+        f"by the echoes the clock of {request.vehicle.name} is {seconds:.2f} s ahead of that of the beams, "
+        f"deviation {deviation:.2f} s (--offset sets it)"
     )
-    return found.seconds
+    return seconds
 
 
 def _reader_of_motion(path: Path) -> Optional[Callable[[Path, MotionNames], Motion]]:

@@ -1,9 +1,9 @@
 """What every node tells of itself on /diagnostics, as the page lists it."""
 
 import time
-from dataclasses import dataclass
 from typing import Callable, Dict, List, Mapping, Tuple
 
+from node_support.health import HealthReport
 from web_page.board import WORDS, Board
 from web_page.messages import text_of
 
@@ -15,15 +15,6 @@ _ANSWERS = ("fine: ", "DOUBTFUL: ", "not measured: ")
 _CAUSES, _NO_CAUSE = "causes", "none found"
 
 
-@dataclass(frozen=True)
-class Report:
-    """What one stage says: level 0 to 2 (3 stale), one line, and figures by name."""
-
-    level: int
-    text: str
-    values: Mapping[str, str]
-
-
 class Stages:
     """Shows the reports of all stages, each as often as a person reads it."""
 
@@ -31,7 +22,7 @@ class Stages:
         self._board, self._clock = board, clock
         self._shown: Dict[str, float] = {}
 
-    def take(self, name: str, report: Report) -> None:
+    def take(self, name: str, report: HealthReport) -> None:
         """Show the report of a stage, named "node: stage", unless its last one is fresh."""
         name, now = name[:_LONGEST], self._clock()
         if name not in self._shown and len(self._shown) >= _MOST_STAGES:

@@ -4,7 +4,7 @@ from typing import Optional
 
 from imagenex_852_driver.device import Ping, SonarDevice
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
-from imagenex_852_driver.parameters import DriverParameters
+from imagenex_852_driver.parameters import DriverParameters, LineTiming
 from imagenex_852_driver.reply import Reply, head_angle
 from node_support.ros.node import run
 from sonar_driver.emulated_head import EchoSource, FaultInjector
@@ -33,4 +33,5 @@ def _message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine
 
 
 def _head(parameters: EmulatorParameters, source: EchoSource, faults: FaultInjector) -> Emulated852:
-    return Emulated852(source, faults, parameters.timing(), parameters.head_id)
+    timing = LineTiming(parameters.baud_rate, parameters.speed_of_sound)
+    return Emulated852(source, faults, timing, parameters.head_id)

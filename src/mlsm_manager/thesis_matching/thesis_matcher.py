@@ -84,15 +84,10 @@ def rigid_motion(points: np.ndarray, targets: np.ndarray) -> np.ndarray:
     return np.append(target - rotated(middle, yaw), yaw)
 
 
-class SegmentFit(NamedTuple):
-    """translations: (n, 2) m for each point, in the order of time. slope: (2,) m/s of the last segment, 0 if still."""
-
-    translations: np.ndarray
-    slope: np.ndarray
-
-
-def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray, counted: np.ndarray) -> SegmentFit:
-    """Return the translations that segments of points need.
+def translate_segments(
+    times: np.ndarray, moving: np.ndarray, errors: np.ndarray, counted: np.ndarray
+) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the translations (n, 2) [m] that segments of points need, and slope (2,) [m/s] of the last, 0 if still.
 
     times: (n,) s, increasing or equal. moving: (n,) bool; a segment is a run of equal values. errors: (n, 2) m from
     each point to its block. counted: (n,) bool, whose errors count; a segment without any goes on as the one before.
@@ -114,7 +109,7 @@ def translate_segments(times: np.ndarray, moving: np.ndarray, errors: np.ndarray
             offset, slope = _line(since[chosen], errors[part][chosen], last)
             translations[part] = offset + since[:, np.newaxis] * slope
         last = translations[end - 1]
-    return SegmentFit(translations, slope)
+    return translations, slope
 
 
 def _runs(moving: np.ndarray) -> List[Tuple[int, int]]:
@@ -242,9 +237,8 @@ def _moved(fit: _Fit, scan: Scan, places: np.ndarray, targets: np.ndarray, count
     if not scan.moving.any():
         correction = composed(rigid_motion(places[counted], targets[counted]), fit.correction)
         return fit._replace(correction=correction, iterations=fit.iterations + 1)
-    found = translate_segments(scan.times, scan.moving, targets - places, counted)
-    shifts, slope = fit.shifts + found.translations, fit.slope + found.slope
-    return fit._replace(shifts=shifts, slope=slope, iterations=fit.iterations + 1)
+    shifts, slope = translate_segments(scan.times, scan.moving, targets - places, counted)
+    return fit._replace(shifts=fit.shifts + shifts, slope=fit.slope + slope, iterations=fit.iterations + 1)
 
 
 def _error(places: np.ndarray, blocks: Blocks) -> float:

@@ -5,7 +5,7 @@ turns.
 """
 
 from contextlib import suppress
-from typing import List, NamedTuple
+from typing import List, NamedTuple, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -30,13 +30,6 @@ _COVERED = 0.3  # share of the echoes at least, at an offset that counts
 _CLEAR = 6.0  # deviations of all offsets by which the best one is better than the usual; noise reaches 4 in 1,200
 _NORMAL = 1.48  # standard deviation over the median of absolute differences
 _PARTS = 4  # of the recording, whose own offsets tell the deviation
-
-
-class ClockOffset(NamedTuple):
-    """seconds: to be added to the stamps of the beams. deviation: s."""
-
-    seconds: float
-    deviation: float
 
 
 class _Echoes(NamedTuple):
@@ -64,8 +57,9 @@ class _Way(NamedTuple):
         return found
 
 
-def clock_offset(beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray) -> ClockOffset:
-    """Return what must be added to the stamps of `beams` so that `track`, T_odom_base, has the same clock.
+def clock_offset(beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray) -> Tuple[float, float]:
+    """Return what must be added to the stamps of `beams`, s, so that `track`, T_odom_base, has the same clock, and the
+    deviation of that, s.
 
     Looked for are offsets of up to ten minutes, and where the two have no time in common those around all that let
     one lie in the other. Raises RecordingError where the echoes do not tell.
@@ -81,7 +75,7 @@ def clock_offset(beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray) 
             f"deviations above others, {_CLEAR:g} are needed; give --offset SECONDS"
         )
     seconds = _finest(echoes, way, best)
-    return ClockOffset(seconds, _deviation(echoes, way, seconds))
+    return seconds, _deviation(echoes, way, seconds)
 
 
 def _clearness(scores: np.ndarray) -> float:

@@ -130,14 +130,19 @@ def _inside(
 
 def _reach_of_planes(triangles: np.ndarray, cosine: float) -> np.ndarray:
     """Return the least distance in a round cone to the planes of triangles (p, 3, 3); `cosine`: of half its angle."""
-    normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
-    heights = _dot(triangles[:, 0], normals)
+    normals, heights = _planes_of(triangles)
     forward = np.clip(normals[:, 0] * np.sign(heights), -1.0, 1.0)
     # The cosine of the angle between the plane's perpendicular and the cone: 1 if the perpendicular is inside the cone.
     nearest = forward * cosine + np.sqrt((1.0 - forward**2) * (1.0 - cosine**2))
     nearest = np.where(forward >= cosine, 1.0, nearest)
     return np.where(nearest > 0.0, np.abs(heights) / np.maximum(nearest, _TOLERANCE), np.inf)
+
+
+def _planes_of(triangles: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the unit normals (p, 3) of triangles (p, 3, 3), and how far their planes lie along these (p,)."""
+    normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
+    normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
+    return normals, _dot(triangles[:, 0], normals)
 
 
 def _widest_cosine(planes: np.ndarray) -> float:
@@ -171,9 +176,7 @@ def _nearest_points(triangles: np.ndarray, planes: np.ndarray) -> np.ndarray:
     The part of a triangle inside the beam is a convex polygon. Its nearest point is the foot of the perpendicular, or
     is on a side: on an edge of the triangle or on one of the planes.
     """
-    normals = _cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    normals /= np.sqrt(_dot(normals, normals))[:, np.newaxis]
-    heights = _dot(triangles[:, 0], normals)
+    normals, heights = _planes_of(triangles)
     edges = triangles[:, _NEXT_CORNER] - triangles
     edge_normals = _cross(normals[:, np.newaxis], edges)
     edge_normals /= np.sqrt(_dot(edge_normals, edge_normals))[..., np.newaxis]

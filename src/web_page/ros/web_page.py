@@ -15,6 +15,7 @@ from georeferencing.origin import EAST_DEG, Origin
 from node_support import topics
 from node_support.errors import RefusedInput
 from node_support.files import package_folder
+from node_support.health import HealthReport
 from node_support.marks import Mark
 from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import StartError
@@ -29,7 +30,7 @@ from web_page.messages import DeleteMark, Request, SetMark
 from web_page.parameters import WebPageParameters
 from web_page.scene import Scene, Status
 from web_page.server import PageServer, Served
-from web_page.stages import Report, Stages
+from web_page.stages import Stages
 
 _PERIOD = 0.25  # s: positions of a slow vehicle
 _CELL = "mlsm_core/resolution"
@@ -154,4 +155,5 @@ class WebPage:
             for one in message.status:
                 # Levels are bytes in Python 3.
                 level = one.level if isinstance(one.level, int) else ord(one.level or b"\0")
-                self._stages.take(one.name, Report(level, one.message, {pair.key: pair.value for pair in one.values}))
+                values = {pair.key: pair.value for pair in one.values}
+                self._stages.take(one.name, HealthReport(level, one.message, values))

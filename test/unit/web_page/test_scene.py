@@ -4,12 +4,13 @@ import json
 
 import numpy as np
 
+from node_support.health import HealthReport
 from node_support.thin_queue import ThinQueue
 from sonar_processing.beams.beam import Beam
 from web_page.board import Board
 from web_page.parameters import WebPageParameters
 from web_page.scene import Scene, Status, pooled
-from web_page.stages import Report, Stages
+from web_page.stages import Stages
 
 
 class _Watched:
@@ -120,7 +121,7 @@ def test_a_stage_is_told_with_its_checks_and_the_cause_that_is_doubted():
         "scans in": "7", "scans in per second": "0.06", "odometry decided": "fine: it is clear",
         "scans on the map": "DOUBTFUL: 20 %", "causes": "the sonar is turned by 5 deg", "blocks": "12",
     }  # fmt: skip
-    Stages(watched.board, lambda: 0.0).take("mapping: mlsm_core", Report(1, "running", values))
+    Stages(watched.board, lambda: 0.0).take("mapping: mlsm_core", HealthReport(1, "running", values))
     stage = watched.texts()["stage"]
     assert stage["counts"] == [["scans in", "7", "0.06"]]
     assert stage["checks"] == [["odometry decided", "fine", "it is clear"], ["scans on the map", "DOUBTFUL", "20 %"]]
@@ -131,5 +132,5 @@ def test_many_stages_and_long_words_stay_bounded():
     watched = _Watched()
     stages = Stages(watched.board, lambda: 0.0)
     for number in range(1000):
-        stages.take(f"{number} " + "x" * 10_000, Report(0, "y" * 10_000, {}))
+        stages.take(f"{number} " + "x" * 10_000, HealthReport(0, "y" * 10_000, {}))
     assert watched.page.waiting_bytes < 64 * 1000 + 1000
