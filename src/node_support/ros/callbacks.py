@@ -49,7 +49,7 @@ def guarded(health: Health, callback: Callable[..., None], topic: str = "") -> C
     return call
 
 
-def every(period: float, callback: Callable[[], None], health: Health) -> threading.Thread:
+def every(period: float, callback: Callable[[], None], health: Health) -> None:
     """Call back every `period` seconds of wall time until shutdown.
 
     Wall time, because diagnostics and displays must go on while a simulated clock stands still or jumps.
@@ -64,7 +64,7 @@ def every(period: float, callback: Callable[[], None], health: Health) -> thread
                 time.sleep(min(_LONGEST_WAIT, max(next_call - time.monotonic(), 0.0)))
             call()
 
-    return _started(loop)
+    threading.Thread(target=loop, daemon=True).start()
 
 
 def every_clock_period(period: float, callback: Callable[[], None], health: Health) -> threading.Thread:
@@ -84,7 +84,9 @@ def every_clock_period(period: float, callback: Callable[[], None], health: Heal
             due = due + period if 0.0 <= now - due < period else now + period
             call()
 
-    return _started(loop)
+    thread = threading.Thread(target=loop, daemon=True)
+    thread.start()
+    return thread
 
 
 def on_change(period: float, callback: Callable[[], None], health: Health) -> Callable[[], None]:
@@ -110,14 +112,8 @@ def on_change(period: float, callback: Callable[[], None], health: Health) -> Ca
                 called = time.monotonic()
                 call()
 
-    _started(loop)
+    threading.Thread(target=loop, daemon=True).start()
     return news.set
-
-
-def _started(loop: Callable[[], None]) -> threading.Thread:
-    thread = threading.Thread(target=loop, daemon=True)
-    thread.start()
-    return thread
 
 
 def _wait_on_clock(seconds: float) -> None:

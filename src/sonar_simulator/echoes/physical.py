@@ -134,9 +134,7 @@ class Physical:
         index = np.ceil(np.minimum(contacts.ranges, 1e9) / self._resolution).astype(np.int64) - 1
         beam, contact = np.nonzero(index < self.bins)
         ranges = np.maximum(contacts.ranges[beam, contact], _NEAREST)
-        patch = Scattering(contacts.materials).per_ray(
-            contacts.material[beam, contact], contacts.cosines[beam, contact]
-        )
+        patch = scattered(contacts.materials, contacts.material[beam, contact], contacts.cosines[beam, contact])
         patch *= contacts.shares[beam, contact] * contacts.losses[beam, contact]
         patch *= self._lobe(contacts.directions[beam, contact], ranges) / np.square(ranges)
         cells = beam * self.bins + np.maximum(index[beam, contact], 0)
@@ -200,30 +198,22 @@ class Physical:
         return settings.tvg_spreading * np.log10(ranges) + 2.0 * settings.tvg_absorption * ranges
 
 
-class Scattering:
-    """How much sound a ray's patch of surface returns, by material and incidence.
+def scattered(materials: Sequence[Material], material: np.ndarray, cosines: np.ndarray) -> np.ndarray:
+    """Return sigma / cos t: the share that a patch returns of 1 / cos t times its ray's cross-section, at incidence t.
+
+    material: (...) int, number of each ray's material. cosines: (...) of t.
 
     Facets of a surface with Gaussian slopes reflect sound back where they face the sonar (Kirchhoff's approximation
     for high frequencies); finer roughness scatters it by Lambert's law (APL-UW TR 9407, section IV):
-    sigma = R^2 / (8 pi s^2 cos^4 t) exp(-tan^2 t / 2 s^2) + mu cos^2 t, at incidence t.
+    sigma = R^2 / (8 pi s^2 cos^4 t) exp(-tan^2 t / 2 s^2) + mu cos^2 t.
     """
-
-    def __init__(self, materials: Sequence[Material]) -> None:
-        square_slopes = np.array([material.slope**2 for material in materials])
-        reflections = np.array([material.reflection**2 for material in materials])
-        self._facets = reflections / (8.0 * math.pi * square_slopes)
-        self._steepness = 0.5 / square_slopes
-        self._lambert = np.array([10.0 ** (material.lambert_db / 10.0) for material in materials])
-
-    def per_ray(self, material: np.ndarray, cosines: np.ndarray) -> np.ndarray:
-        """Return sigma / cos t: the share that returns from a patch of 1 / cos t times the ray's cross-section.
-
-        material: (...) int, number of each ray's material. cosines: (...) of the incidence t.
-        """
-        cosines = np.maximum(cosines, _GRAZING)
-        inverse_square = 1.0 / np.square(cosines)
-        facets = self._facets[material] * np.exp(self._steepness[material] * (1.0 - inverse_square))
-        return facets * np.square(inverse_square) / cosines + self._lambert[material] * cosines
+    square_slopes = np.array([one.slope**2 for one in materials])
+    facets = np.array([one.reflection**2 for one in materials]) / (8.0 * math.pi * square_slopes)
+    lambert = np.array([10.0 ** (one.lambert_db / 10.0) for one in materials])
+    cosines = np.maximum(cosines, _GRAZING)
+    inverse_square = 1.0 / np.square(cosines)
+    facing = facets[material] * np.exp((0.5 / square_slopes)[material] * (1.0 - inverse_square))
+    return facing * np.square(inverse_square) / cosines + lambert[material] * cosines
 
 
 def absorption(frequency_khz: float, temperature: float, salinity: float) -> float:

@@ -5,7 +5,7 @@ from hypothesis import strategies as st
 
 from sonar_simulator.echoes.beam_tracer import Contacts
 from sonar_simulator.echoes.echo_model import make_echo_model
-from sonar_simulator.echoes.physical import Physical, PhysicalParameters, Scattering, absorption
+from sonar_simulator.echoes.physical import Physical, PhysicalParameters, absorption, scattered
 from sonar_simulator.world.world import MATERIALS
 
 STILL = {"speckle": 0.0, "noise_level_db": -300.0, "volume_scattering_db": -300.0, "ringing": 0.0}
@@ -67,9 +67,8 @@ def test_the_beam_is_3_db_down_each_way_at_its_openings():
 
 @given(st.sampled_from(sorted(MATERIALS)), st.floats(0.06, 1.0), st.floats(0.06, 1.0))
 def test_no_material_sends_back_more_at_grazing_than_at_right_angles(name, one, other):
-    scattering = Scattering([MATERIALS[name]])
     low, high = sorted((one, other))
-    weak, strong = scattering.per_ray(np.zeros(2, dtype=int), np.array([low, high]))
+    weak, strong = scattered([MATERIALS[name]], np.zeros(2, dtype=int), np.array([low, high]))
     assert 0.0 < weak <= strong * (1.0 + 1e-9) or high < 0.5
 
 
