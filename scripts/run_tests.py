@@ -31,7 +31,6 @@ MEASURING = ("imagenex_852_load", "ping360_load")
 # Rostests that take longest: those that begin last should be short.
 LONG = (
     "one_and_many_processes", "every_node", "vehicle_emulated", "silence", "thrusters_demo", "strafing_demo",
-    "unaided_demo",
 )  # fmt: skip
 # Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds:
 # only the steps that take longest do it twice.
@@ -112,7 +111,7 @@ def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
 
 def _damaged_files() -> Step:
     """Return the step of scripts/fuzz, with few of its damages."""
-    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "6"]
+    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "5"]
     variables = {"PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}", "OPENBLAS_NUM_THREADS": "1"}
     return Step("damaged files", command, load=Load.SPARE, timeout=SPARE_TIMEOUT, variables=variables)
 

@@ -48,7 +48,7 @@ def test_nearly_all_scans_are_matched(marina):
 
 
 def test_a_range_setting_that_is_shortened_does_not_make_the_odometry_look_too_long(recording):
-    whole = shortened(read_recording(recording("marina_first.bag"), Request()), 600.0)
+    whole = shortened(read_recording(recording("marina_first.bag"), Request()), 400.0)
     assert not mapped_as(range_told(whole, at=200.0, share=0.4), "--refine").findings.trust.causes
 
 

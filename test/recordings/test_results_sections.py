@@ -6,7 +6,7 @@ import pytest
 from thesis_results.__main__ import SECTIONS
 from thesis_results.pictures import MOST_BYTES, Pictures
 
-QUICK = ("recorded", "processing", "processing-recorded")
+QUICK = ("recorded", "processing-recorded")
 
 
 @pytest.mark.parametrize("section", [one for one in SECTIONS if one.word in QUICK], ids=lambda one: one.word)

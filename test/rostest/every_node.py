@@ -26,15 +26,12 @@ INT_LIMIT = 2**31 - 1
 REFUSED = "changes of parameters refused"
 # Node, parameter, and what its last line tells of it.
 BAD_STARTS: List[Tuple[str, str, str]] = [
-    ("sonar_simulator", "seed:=-1", "seed = -1"),
     ("sonar_simulator", "world:=/nowhere.sdf", "/nowhere.sdf"),
     ("gazebo_sonar", "head:=TURN", "head = 'TURN'"),
     ("mapping", "chain:=[none_such]", "none_such"),
     ("sonar_processing", "chain:=5", "chain"),
-    ("sonar_to_cloud", "mode:=SONARLASER", "mode = 'SONARLASER': must be one of SONAR, LASER, SONARCONT, LASERCONT"),
     ("thresholder", "otsu_multiplier:=.nan", "otsu_multiplier = nan: must be a number from 0 to 10"),
     ("imagenex_852_driver", "max_range:=7", "max_range = 7: not allowed by the protocol, which takes 5, 10"),
-    ("ping360_driver", "max_range:=0.5", "max_range = 0.5: must be a number from 0.75 to 50 m"),
     ("ping360_driver", "port:=udp://nowhere", "must be udp://HOST:PORT"),
 ]
 UNKNOWN = "no_such_parameter:=1", "no_such_parameter = 1: no such parameter"

@@ -50,6 +50,12 @@ def test_a_recording_is_played_with_the_shapes_estimator_and_odometry_that_are_a
     assert (found["/mlsm_core/estimator"], found["/mlsm_core/odometry"]) == ("THESIS", "HEADING")
 
 
+def test_a_simulated_vehicle_without_instruments_is_followed_as_one_that_tells_nothing_of_its_motion():
+    found = parameters("demo", odometry="none")
+    assert (found["/sonar_simulator/instruments"], found["/mlsm_core/odometry"]) == ("NONE", "NONE")
+    assert not any(name.startswith("/dead_reckoning/") for name in found)
+
+
 def test_a_topside_behind_a_thin_link_sends_who_wants_the_page_to_the_vehicle():
     assert "/web_page/map_frame" in parameters("topside", web="true")
     assert "/web_page/map_frame" not in parameters("topside", link="thin")
