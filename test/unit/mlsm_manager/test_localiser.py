@@ -260,7 +260,7 @@ def test_relocalisation_in_an_empty_map_is_refused():
     assert found(drifting(0), estimator_of()).status is MatchStatus.TOO_FEW_POINTS
 
 
-OPEN_WATER_SCANS = 50
+OPEN_WATER_SCANS = 25
 
 
 @pytest.mark.long

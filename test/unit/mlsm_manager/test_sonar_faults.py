@@ -9,6 +9,7 @@ from benchmarks.rare_faults import mount_tilted
 from made_recordings import touring
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, ranges_changed_at
+from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 WHOLE, MIDDLE = shortened(touring(), 200.0), 100.0
@@ -17,7 +18,7 @@ ARM = SonarFault(SonarKind.ARM, np.nan, (2.0, 1.0))
 TILT = SonarFault(SonarKind.TILT, np.nan, (0.1, 0.0))
 RANGES = SonarFault(SonarKind.RANGES, 1.5, (np.log(2.0),))
 SONAR_IN_BASE = np.array([1.0, 0.0])
-NAMED = ("--odometry", "heading")  # to try whether the vehicle strafes as well takes longest: one test shows that
+NAMED = ("--odometry", "heading")  # to try whether the vehicle strafes as well would take longest
 
 
 @pytest.mark.parametrize(
@@ -61,7 +62,7 @@ def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
         (mount_tilted(WHOLE, 25.0), "the sonar's plane is tilted by about 2", ()),
         (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", ()),
         (broken.range_changed(COMPASS, MIDDLE, 1.5), "the range setting changed untold: reported ranges", NAMED),
-        (broken.mount_upside_down(COMPASS), "the sonar is upside down, or its head turns the other way", ()),
+        (broken.mount_upside_down(COMPASS), "the sonar is upside down, or its head turns", NAMED),
     ],
     ids=["arm", "tilt", "ranges", "ranges by compass", "over by compass"],
 )
@@ -71,3 +72,11 @@ def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, 
     assert found.findings.trust.line.startswith("trust: DOUBTFUL")
     truth = WHOLE.track.at(found.run.times) - WHOLE.track.poses[0] + recording.track.poses[0]
     assert np.hypot(*(found.run.best - truth)[:, :2].T).mean() < 0.5  # m
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("recording", [broken.mount_upside_down(COMPASS), broken.range_changed(COMPASS, 50.0, 1.5)])
+def test_a_fault_beside_a_compass_alone_does_not_make_the_vehicle_seem_to_strafe(recording):
+    found = mapped_as(shortened(recording, 100.0))
+    assert found.replayed.strafing is not None
+    assert found.odometry.kind is OdometryKind.HEADING
