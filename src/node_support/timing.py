@@ -28,16 +28,16 @@ class Pace:
         self._clock = clock
         self._start = clock()
 
-    def wait_for(self, simulated: float) -> float:
-        """Wait for a simulated time [s since the start]; return how late it already was, s of wall time."""
+    def wait_for(self, simulated: float) -> bool:
+        """Wait for a simulated time [s since the start]; return whether it is so late that the schedule was shifted."""
         late = self._clock() - (self._start + simulated / self._factor)
         if late < 0.0:
             self._wait(-late)
-            return 0.0
-        if late > _CATCH_UP:
-            self._start += late
-            self.lost += late
-        return late
+        if late <= _CATCH_UP:
+            return False
+        self._start += late
+        self.lost += late
+        return True
 
 
 class UsualInterval:

@@ -6,7 +6,7 @@ from abc import ABC, abstractmethod
 from collections import Counter, deque
 from dataclasses import dataclass, fields
 from enum import Enum
-from typing import Deque, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Deque, List, NamedTuple, Sequence, Tuple
 
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_driver.port import transmission_time
@@ -62,8 +62,8 @@ class FaultRates(ParameterSet):
 class FaultInjector:
     """Chooses a fault for every command and counts what it chose in `counts`."""
 
-    def __init__(self, rates: Optional[FaultRates] = None, seed: int = 0) -> None:
-        self.rates = rates or FaultRates()
+    def __init__(self, rates: FaultRates, seed: int = 0) -> None:
+        self.rates = rates
         self.counts: Counter[Fault] = Counter()
         self._ordered: Deque[Fault] = deque()
         self._random = random.Random(seed)
@@ -167,9 +167,9 @@ class EmulatedHead(ABC):
     does something by itself, and `advance` is to be called.
     """
 
-    def __init__(self, faults: Optional[FaultInjector] = None, baud_rate: float = float("inf")) -> None:
+    def __init__(self, faults: FaultInjector, baud_rate: float) -> None:
         """`baud_rate` is infinite where bytes take no time and a message is sent as a whole, on a network."""
-        self.faults = faults or FaultInjector()
+        self.faults = faults
         self.absent_from = float("-inf")
         self.absent_until = float("-inf")
         self.next_event = float("inf")

@@ -175,19 +175,18 @@ class History:
     def __len__(self) -> int:
         return len(self._rows)
 
-    def take(self, row: Sequence[float]) -> bool:
-        """Keep a row unless it follows the last one too soon; return whether it was kept."""
+    def take(self, row: Sequence[float]) -> None:
+        """Keep a row unless it follows the last one too soon."""
         if self._rows and row[0] - self._rows[-1][0] < self._least:
-            return False
+            return
         self._rows.append(row)
         if len(self._rows) < _MOST_ROWS:
             self._show((len(self._rows) - 1) // _CHUNK)
-            return True
+            return
         before = self._chunks()
         self._rows, self._least = self._rows[1::2], max(2.0 * self._least, 1e-3)
         for chunk in range(before):
             self._show(chunk)
-        return True
 
     def _chunks(self) -> int:
         return -(-len(self._rows) // _CHUNK)

@@ -40,10 +40,8 @@ _MOST = 2.5  # m, of a letter: larger ones hide the map
 _LINE, _THIN = 0.08, 0.03  # letters: width of a line, and of one of the grid
 _VEHICLE, _ABOVE = 2.0, 1.5  # letters: length of the vehicle's arrow, height over it
 _ASIDE = (-6.0, -7.0)  # letters from the vehicle, where scale bar and north arrow begin
-_GRID, _LABELS = (
-    30.0,
-    (18.0, 12.0),
-)  # letters from the vehicle: where lines of the grid end, and where they are labelled
+# Letters from the vehicle: where lines of the grid end, and where they are labelled.
+_GRID, _LABELS = 30.0, (18.0, 12.0)
 _BARS = (0.1, 1.0, 10.0)  # m: the longest one that eight letters hold is drawn
 _WITHIN = float(np.sqrt(-2.0 * np.log(0.05)))  # deviations of a plane's ellipse that holds 95 %
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 49)

@@ -98,9 +98,7 @@ class BagPlayer:
         rospy.signal_shutdown("the bag has ended")
 
     def _tick(self, pace: Pace, since_start: float) -> None:
-        lost = pace.lost
-        pace.wait_for(since_start)
-        if pace.lost > lost:
+        if pace.wait_for(since_start):
             detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with rate {self._options.rate:g}"
             self._health.problem("delays", f"{detail}; give a smaller one")
         self._clock.publish(Clock(genpy.Time.from_sec(self._messages[0].time + since_start)))

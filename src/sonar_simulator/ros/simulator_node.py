@@ -145,10 +145,8 @@ class Simulator:
         return True
 
     def _keep_pace(self, moment: Moment, pace: Pace) -> None:
-        lost = pace.lost
         self._echoes.wait_for(self._start_time + moment.time)
-        pace.wait_for(moment.time)
-        if pace.lost > lost:
+        if pace.wait_for(moment.time):
             factor = self._parameters.real_time_factor
             detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with real_time_factor {factor:g}"
             self.health.problem("delays", detail)

@@ -20,7 +20,8 @@ def _rows(told):
 def test_rows_that_follow_too_soon_are_left_out():
     told = {}
     history = History(Kind.TRACK, 1.0, told.__setitem__)
-    assert [history.take((time, 0.0)) for time in (0.0, 0.5, 1.0)] == [True, False, True]
+    for time in (0.0, 0.5, 1.0):
+        history.take((time, 0.0))
     assert _rows(told)[:, 0].tolist() == [0.0, 1.0]
 
 
