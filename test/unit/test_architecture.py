@@ -33,7 +33,7 @@ ALLOWED = {
     "sonar_simulator": {"node_support", "recordings", "sonar_processing"},
 }
 ROS_NAMES = {
-    "rospy", "roslib", "rosgraph", "rosbag", "genpy", "message_filters", "dynamic_reconfigure", "diagnostic_updater",
+    "rospy", "roslib", "rosgraph", "rosbag", "genpy", "dynamic_reconfigure", "diagnostic_updater",
     "underwater_map_construction",
 }  # fmt: skip
 ROS_ENDINGS = ("_msgs", "_srvs", "tf2_ros", "tf2_py")

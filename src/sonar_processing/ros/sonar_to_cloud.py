@@ -81,9 +81,8 @@ class SonarToCloud:
         parameters = self._live.current
         mount = SonarMount(parameters, self.health.name)
         self._filter = TransformFilter(
-            parameters.target_frame, self.health, self._forget_scan, parameters.stamp_tolerance, mount
+            parameters.target_frame, self.health, self._place, self._forget_scan, parameters.stamp_tolerance, mount
         )
-        self._filter.registerCallback(guarded(self.health, self._place))
         subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)
         self.health.expect(rospy.resolve_name(topics.BEAMS))
         BeamSubscriber(self._take_beam, parameters, self.health, self._filter.forget, self._filter.make_room)

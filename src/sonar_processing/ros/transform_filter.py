@@ -7,14 +7,13 @@ import threading
 import time
 from typing import Callable, Dict, List, Optional, Tuple
 
-import message_filters
 import rospy
 import tf2_ros
 from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
 
 from node_support.errors import RefusedInput
 from node_support.geometry import quaternion_of
-from node_support.headers import DAY, JUMP_BACK
+from node_support.headers import JUMP_BACK
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
 from node_support.ros.transforms import TfBuffer
@@ -75,7 +74,7 @@ def _transform(parameters: MountingParameters, frame: str) -> TransformStamped:
     return made
 
 
-class TransformFilter(message_filters.SimpleFilter):
+class TransformFilter:
     """Calls back with a PlacedBeam, in the order of the stamps, as soon as tf knows both frames.
 
     A beam is dropped and counted when it has waited too long (BeamQueue), when it is older than one that was delivered,
@@ -88,16 +87,16 @@ class TransformFilter(message_filters.SimpleFilter):
         self,
         target_frame: str,
         health: Health,
+        on_beam: Callable[[PlacedBeam], None],
         on_time_jump: Callable[[], None],
-        stamp_tolerance: float = DAY,
+        stamp_tolerance: float,
         mount: Optional[SonarMount] = None,
     ) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s. `mount`: places frames that tf lacks."""
-        super().__init__()
         self._mount = mount
         self._target_frame = target_frame
         self._health = health
-        self._on_time_jump = guarded(health, on_time_jump)
+        self._on_beam, self._on_time_jump = guarded(health, on_beam), guarded(health, on_time_jump)
         self._condition = threading.Condition()
         self._queue = BeamQueue()
         self._newest_ns: Optional[int] = None
@@ -170,7 +169,7 @@ class TransformFilter(message_filters.SimpleFilter):
             self._on_time_jump()
         for beam in placed:
             if beam is not None:
-                self.signalMessage(beam)
+                self._on_beam(beam)
 
     def _departures(self) -> List[Tuple[WaitingBeam, str]]:
         """Return the beams that leave the queue, each with why it cannot be placed, from the first placed one on."""

@@ -98,9 +98,8 @@ class GazeboSonar:
     def _make_filter(self) -> Optional[TransformFilter]:
         if self._parameters.head is HeadMode.SWEEP:
             return None
-        made = TransformFilter(self._parameters.frame_id, self.health, lambda: None, self._parameters.stamp_tolerance)
-        made.registerCallback(guarded(self.health, self._turned))
-        return made
+        frame, tolerance = self._parameters.frame_id, self._parameters.stamp_tolerance
+        return TransformFilter(frame, self.health, self._turned, lambda: None, tolerance)
 
     def _take_scan(self, message: rospy.AnyMsg) -> None:
         self.health.count("scans in")
