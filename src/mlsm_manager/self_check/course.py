@@ -13,6 +13,7 @@ _FEWEST = 10  # stretches
 _AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
 _STRAFES = np.radians(20.0)  # deviation of the course, beyond which the vehicle has no usual one; ahead: 5 to 13 deg
 _VAGUE = np.radians(5.0)  # deviation of the mean course: sonar and DVL are mounted by eye to 6 deg; a marina's: 4.8 deg
+_CLEAR = 10.0  # deviations: so large a turn is told however vague it is
 _ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
 _NAMED = 2.0  # deviations
 _FAR = 3.0  # deviations: what goes farther aside counts as far
@@ -48,8 +49,17 @@ class CourseFound(NamedTuple):
         """By how much a sonar may be turned that seems turned so beside a DVL, whose own turn may hide more, rad."""
         return float(np.hypot(self.turn, self.deviation))
 
+    def after(self, before: "CourseFound") -> "CourseFound":
+        """Return what is known of the mount if so much was known `before`.
+
+        That holds until another turn is told, or the vehicle is seen to have no usual course: it does not become right
+        because the newest way is vague.
+        """
+        return before if before.is_told and not (self.is_told or self.strafes) else self
+
 
 NOT_TOLD = CourseFound(0.0, np.inf)
+"""Of a vehicle that was not seen for long enough."""
 
 
 def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
@@ -71,8 +81,9 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
     deviation = np.hypot(1.25 * spread / np.sqrt(_worth(wrapped(angles - middle), spread)), _AHEAD)
-    strafes = spread > _STRAFES or deviation > _VAGUE or abs(middle) > largest
-    return CourseFound(-middle, np.inf if strafes else float(deviation), strafes)
+    strafes = bool(spread > _STRAFES or abs(middle) > largest)
+    is_clear = deviation <= _VAGUE or abs(middle) > _CLEAR * deviation
+    return CourseFound(-middle, float(deviation) if is_clear and not strafes else np.inf, strafes)
 
 
 def _worth(aside: np.ndarray, spread: float) -> float:

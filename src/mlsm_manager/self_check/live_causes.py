@@ -13,6 +13,7 @@ from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ranked, widened
+from mlsm_manager.self_check.course import NOT_TOLD, CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
@@ -40,6 +41,7 @@ class LiveCauses:
             self._is_new = False
             self._found: List[Cause] = []
             self._spread, self.by_mounts = np.zeros((2, 2)), 0.0
+            self._course = NOT_TOLD
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
@@ -66,19 +68,21 @@ class LiveCauses:
         of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
         path = composed(corrections.at(track.times), track.poses)
         of_beams, spread, by_mounts = standing_causes(scans, track, path), np.zeros((2, 2)), 0.0
+        course = self._course
         found = [*of_echoes, *of_beams]
         run = newest_run()
         if run is not None:
             # What a stuck compass missed is not tried: the path is not mended live.
             shown = [cause.fault for cause in found if cause.fault is not None]
             shown = [fault for fault in shown if fault.kind is not FaultKind.STUCK]
-            motion = _motion_of(run, [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])])
-            found, by_mounts = motion.told_with(of_echoes, of_beams), motion.by_mounts
+            motion = _motion_of(run, [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])], course)
+            found, by_mounts, course = motion.told_with(of_echoes, of_beams), motion.by_mounts, motion.course
             spread = motion.spread(run.log.node_times[-1:])[0]
         found += [of_stuck(*one) for one in stuck_headings(track)]
         with self._lock:
             if self._places is places:
                 self._learn(found, spread, by_mounts, scans[0].start)
+                self._course = course
 
     def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
         """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after."""
@@ -109,8 +113,8 @@ def _not_followed(steps: Sequence[Step], begin: float) -> List[MotionFault]:
     return [MotionFault(FaultKind.RIGHT, step.time, (step.turn,)) for step in turned]
 
 
-def _motion_of(run: Solution, suspected: Sequence[Fault]) -> MotionFindings:
-    """Return what speaks against odometry and sonar of a run, and what its course says of the mount."""
+def _motion_of(run: Solution, suspected: Sequence[Fault], before: CourseFound) -> MotionFindings:
+    """Return what speaks against odometry and sonar of a run, and what its course says of the mount, or said before."""
     track = run.log.odometry.track_from(-np.inf)
     motion = without_faults(run, fit_of(run), track, suspected)
-    return motion.with_course(track.with_poses(motion.run.path(track.times)))
+    return motion.with_course(track.with_poses(motion.run.path(track.times)), before)

@@ -67,15 +67,18 @@ class MotionFindings:
         """How far [m] the newest place may be turned about the run's first one by what nothing tells of the mounts."""
         return float(self.mounts * np.hypot(*(self.places[-1] - self.places[0])))
 
-    def with_course(self, path: Track) -> "MotionFindings":
-        """Return the findings with what T_map_base says of the sonar's mount."""
+    def with_course(self, path: Track, before: CourseFound = NOT_TOLD) -> "MotionFindings":
+        """Return the findings with what T_map_base says of the sonar's mount.
+
+        before: what older scans told of it.
+        """
         if not self.is_told:
             return self
-        course, places = self._course_of(path), self.places
+        course, places = self._course_of(path).after(before), self.places
         # Where no course tells which of them is turned, it may be the sonar alone.
         direction = NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
-        if mounts and course.strafes:
+        if mounts and course != NOT_TOLD:
             turn = mounts = direction.hidden
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), turn)) - gone

@@ -16,7 +16,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.course import course_causes, course_of, odometry_agrees
+from mlsm_manager.self_check.course import NOT_TOLD, CourseFound, course_causes, course_of, odometry_agrees
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
 
@@ -214,7 +214,30 @@ def test_a_course_that_is_told_no_better_than_mounts_are_set_tells_nothing_of_th
     course = np.radians(17.0) * np.sin(np.pi * times / seconds)
     places = 0.5 * np.cumsum(np.column_stack([np.cos(course), np.sin(course)]), axis=0)
     found = course_of(Track(times, np.column_stack([places, 0.0 * times])))
-    assert (found.is_told, found.strafes) == (is_told, not is_told)
+    assert (found.is_told, found.strafes) == (is_told, False)
+
+
+def test_a_large_turn_is_told_however_vague_the_course_is():
+    times = np.arange(0.0, 400.0)
+    course = np.radians(17.0) * np.sin(np.pi * times / 50.0)
+    places = 0.5 * np.cumsum(np.column_stack([np.cos(course), np.sin(course)]), axis=0)
+    found = course_of(Track(times, np.column_stack([places, np.full(len(times), np.radians(120.0))])), np.pi)
+    assert np.degrees(found.turn) == pytest.approx(120.0, abs=5.0)
+    assert found.is_told
+
+
+@pytest.mark.parametrize(
+    ("now", "expected"),
+    [
+        (CourseFound(0.25, np.inf), CourseFound(0.3, 0.05)),
+        (NOT_TOLD, CourseFound(0.3, 0.05)),
+        (CourseFound(0.1, 0.04), CourseFound(0.1, 0.04)),
+        (CourseFound(0.7, np.inf, strafes=True), CourseFound(0.7, np.inf, strafes=True)),
+    ],
+    ids=["vague", "at rest", "another one", "strafes"],
+)
+def test_a_turn_that_was_told_holds_until_another_is_or_the_vehicle_strafes(now, expected):
+    assert now.after(CourseFound(0.3, 0.05)) == expected
 
 
 def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_once():
