@@ -34,15 +34,6 @@ def test_points_on_a_border_stay_in_their_cell_when_their_mean_is_taken(resoluti
     assert {tuple(cell) for cell in mlsm.blocks.cells.tolist()} == expected
 
 
-def test_a_cells_centre_lies_half_a_cell_from_its_borders():
-    assert map_with([[-0.1, 0.7, 0, 1]]).blocks.centers.tolist() == [[-0.25, 0.75]]
-
-
-def test_an_empty_map_has_no_blocks():
-    mlsm = MultiLevelSurfaceMap(0.5)
-    assert len(mlsm) == len(mlsm.blocks) == len(mlsm.blocks.cells) == len(mlsm.blocks.type) == 0
-
-
 @pytest.mark.parametrize("column", range(4))
 @pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf])
 def test_a_point_that_is_not_finite_is_counted_and_left_out(column, value):

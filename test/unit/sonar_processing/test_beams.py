@@ -170,17 +170,9 @@ def test_a_mounting_out_of_range_is_refused():
         MountingParameters(mount_x=1000.0)
 
 
-def test_nothing_wrong_changes_nothing():
-    assert BeamCorrection().corrected(BEAM) == BEAM
-
-
 def test_the_delay_is_added_to_the_nanosecond():
     assert BeamCorrection(sonar_delay=0.25).corrected(BEAM).stamp_ns == 5_250_000_001
     assert BeamCorrection(sonar_delay=-5.0).corrected(BEAM).stamp_ns == 1
-
-
-def test_ranges_are_scaled():
-    np.testing.assert_allclose(BeamCorrection(range_scale=0.9).corrected(BEAM).ranges, 0.9 * BEAM.ranges)
 
 
 def test_the_rest_of_the_beam_stays():

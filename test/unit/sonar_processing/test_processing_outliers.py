@@ -99,10 +99,6 @@ def test_statistical_finds_no_outlier_among_fewer_than_three_points(count):
     assert statistical_inliers(_array([(0, 0, 0), (9, 0, 0)][:count]), 20, 0.0).tolist() == [True] * count
 
 
-def test_statistical_keeps_duplicates():
-    assert statistical_inliers(np.zeros((50, 3), dtype=np.float32), 20, 0.0).all()
-
-
 @given(RANDOM, st.floats(0.01, 8.0), st.integers(1, 10))
 def test_radius_keeps_what_pcl_keeps(points, radius, min_neighbors):
     points = _array(points)

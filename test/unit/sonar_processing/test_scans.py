@@ -24,11 +24,6 @@ def test_a_scan_ends_after_scan_size_beams():
     assert [assembler.add(placed()) is not None for _ in range(7)] == [False, False, True, False, False, True, False]
 
 
-def test_a_scan_size_of_one_gives_a_cloud_per_beam():
-    assembler = assembler_with(scan_size=1)
-    assert [len(assembler.add(placed())) for _ in range(3)] == [3, 3, 3]
-
-
 @pytest.mark.parametrize("direction", [1, -1])
 @pytest.mark.parametrize("start", [0.0, 0.5, math.pi, -math.pi, 100.0])
 def test_a_scan_ends_before_the_head_passes_its_start_again(direction, start):
@@ -263,12 +258,6 @@ def test_beams_of_different_bin_counts_cannot_be_organised():
 def test_laser_keeps_one_echo_of_every_beam(strengths, values, points):
     scan = assembler_with(mode="LASER", scan_size=1, **values).add(placed(strengths=strengths))
     assert scan.points.tolist() == points
-
-
-def test_laser_points_have_the_stamps_of_their_beams():
-    assembler = assembler_with(mode="LASER", scan_size=2)
-    assembler.add(placed(strengths=(0, 0, 0), seconds=1))
-    assert assembler.add(placed(strengths=(0, 7, 0), seconds=2)).time_stamps.tolist() == [-2]
 
 
 def test_projecting_a_beam_shows_it_and_leaves_the_scan_alone():

@@ -7,7 +7,7 @@ from programs import ROOT
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.simulation.robot import RobotDescription
-from sonar_simulator.simulation.simulation import Drive, Settings, make_setup
+from sonar_simulator.simulation.simulation import Settings, make_setup
 
 CHARLE = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
 QUICK = {"sonar": {"ray_rows": 5, "ray_columns": 3}}
@@ -82,12 +82,6 @@ def test_a_commanded_vehicle_begins_at_the_scripts_start_and_never_ends(script):
     np.testing.assert_array_equal(setup.simulation.moment(5.0).truth.T_world_base, pose_matrix((-2.0, 0.0, -1.2)))
     setup.commanded.command(5.0, np.array([0.5, 0, 0, 0, 0, 0]))
     assert setup.simulation.moment(6.0).truth.T_world_base[0, 3] > -2.0
-
-
-def test_settings_survive_the_way_to_plain_values_and_back():
-    settings = Settings.from_mapping({"drive": "CMD_VEL", "echo_model": "collision", "odometry": {"scale_error": 0.1}})
-    assert settings.simulator.drive is Drive.COMMANDS
-    assert Settings.from_mapping(settings.to_mapping()) == settings
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from sonar_simulator.echoes.beam_tracer import BeamPattern, Contacts
-from sonar_simulator.echoes.echo_model import ECHO_MODELS, make_echo_model
+from sonar_simulator.echoes.echo_model import make_echo_model
 
 NOISE_FREE = {"spread": 0.0, "noise_echoes": 0}
 
@@ -33,13 +33,6 @@ def test_each_contact_adds_15_up_to_127():
 def test_a_beam_without_a_contact_within_the_range_is_silent_and_has_no_noise(model):
     contacts = Contacts.of_ranges([[np.inf, 50.01, 1e4]])
     assert not make_echo_model(model, {}).echoes(contacts, np.random.default_rng(0)).any()
-
-
-@pytest.mark.parametrize("model", ECHO_MODELS)
-def test_the_same_seed_gives_the_same_bytes_and_another_seed_others(model):
-    model, contacts = make_echo_model(model, {}), Contacts.of_ranges([np.linspace(5.0, 45.0, 500)])
-    first, again, other = (model.echoes(contacts, np.random.default_rng(seed)).tobytes() for seed in (7, 7, 8))
-    assert first == again != other
 
 
 def test_echoes_spread_about_the_contact_by_the_standard_deviation_asked_for():
@@ -70,18 +63,6 @@ def test_noise_lies_around_the_nearest_contact():
 def test_noise_never_leaves_0_to_127(mean, sd):
     strengths = _echoes(np.full(50, 25.0), noise_strength_mean=mean, noise_strength_sd=sd, noise_echoes=500)
     assert strengths.max() <= 127
-
-
-def test_a_batch_gives_one_row_per_beam():
-    strengths = _echoes([[10.05, np.inf], [np.inf, np.inf], [20.05, 30.05]], **NOISE_FREE)
-    assert strengths.shape == (3, 500)
-    assert [np.flatnonzero(row).tolist() for row in strengths] == [[100], [], [200, 300]]
-
-
-def test_bins_and_range_are_as_asked_for():
-    strengths = _echoes([4.88], bins=100, max_range=5.0, **NOISE_FREE)
-    assert strengths.dtype == np.uint8
-    assert np.flatnonzero(strengths).tolist() == [97]
 
 
 EXACT = {"increments": 0}
