@@ -34,8 +34,8 @@ from mlsm_manager.offline.suited_parameters import (
     with_odometry,
 )
 from mlsm_manager.offline.trust import Trust
-from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling
+from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling, ranges_are_told
 from mlsm_manager.self_check.causes import (
     CERTAIN,
     NOTHING_ASSUMED,
@@ -123,7 +123,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
         return _mapped(recording.with_track(track), [*causes, *heard.mounted, cause], known, options)
     of_echoes = [*heard.mounted, *found.causes]
     of_beams = [*beam_causes(recording.beams), *standing_causes(heard.scans, recording.track, replayed.corrected)]
-    refined = _refined(replayed, recording.track, parameters, found.suspected, [*of_echoes, *of_beams], options)
+    refined = _refined(replayed, recording, parameters, found.suspected, [*of_echoes, *of_beams], options)
     runs = _runs(replayed, refined)
     if found.mount == AS_TOLD and _positions_mislead(recording, heard.scans, extracting, odometry, runs, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
@@ -135,7 +135,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
 
 
 def _refined(
-    replayed: Replayed, track: Track, parameters: ReplayParameters, suspected: Sequence[Fault],
+    replayed: Replayed, recording: Recording, parameters: ReplayParameters, suspected: Sequence[Fault],
     causes: Sequence[Cause], options: Namespace,
 ) -> Optional[Refined]:  # fmt: skip
     """Return the fit of the whole run, where one is asked for, with faults mended that are suspected, or causes."""
@@ -143,7 +143,8 @@ def _refined(
         return None
     suspected = [*suspected, *(cause.fault for cause in causes if cause.fault is not None)]
     with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
-        return refine(replayed, track, parameters.map_settings(), suspected, bar.update)
+        told = ranges_are_told(recording.beams)
+        return refine(replayed, recording.track, parameters.map_settings(), suspected, told, bar.update)
 
 
 def _judged(

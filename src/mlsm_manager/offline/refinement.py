@@ -59,12 +59,12 @@ def parts_of_refining(hypotheses: Hypotheses) -> int:
 
 def refine(
     replayed: Replayed, track: Track, settings: MapSettings, suspected: Sequence[Fault] = (),
-    done: Done = lambda: None,
+    ranges_told: bool = False, done: Done = lambda: None,
 ) -> Refined:  # fmt: skip
     """Return the run of all scans that the solvers have taken, fitted at once; live runs are where fits begin.
 
     Of several odometries the likelier one is believed from then on. suspected: what pairs of scans and beams say is
-    wrong with sonar or odometry, which said `track`.
+    wrong with sonar or odometry, which said `track`. ranges_told: as of `without_faults`.
     """
     hypotheses = replayed.hypotheses
     fits = []
@@ -74,7 +74,8 @@ def refine(
     best, solver = hypotheses.believed(fits), hypotheses.shown
     closing = with_loops_closed(solver, best)
     done()
-    motion = without_faults(solver.solution.with_state(closing.batch.state), closing.batch, track, suspected)
+    run = solver.solution.with_state(closing.batch.state)
+    motion = without_faults(run, closing.batch, track, suspected, ranges_told)
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in replayed.scans:

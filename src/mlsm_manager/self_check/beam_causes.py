@@ -20,6 +20,7 @@ _SIDE = 60.0  # s before and after a change that are compared: some turns of the
 _PARTS = np.array([-1.0, -0.6, -0.2, 0.0, 0.2, 0.6, 1.0])  # of these: all parts of a side must say the same
 _FEWEST = 10  # beams in a part
 _CHANGED, _STEADY = 1.5, 1.15  # times: by more a setting changed, by less the parts of a side differ
+_USUAL = [0.05, 0.95]  # shares of the beams that have shorter ranges: a few may be cut short
 _SAMPLE = 400  # beams that tell whether echoes come twice
 _RATIOS = np.array([2.0, 1.5, 1.6, 1.7, 1.8, 1.9, 2.1, 2.2, 2.3, 2.5])  # of ranges: twice, and others by chance
 _NEAREST = 1.0 / 3.0  # of the range, from which on echoes are compared with those nearer
@@ -45,6 +46,13 @@ def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
     heard = [one for one, hears_any in zip(beams, hears) if hears_any]
     found += [_changed(times[hears], heard, measure, text) for text, measure in _MEASURES]
     return [cause for cause in found if cause is not None]
+
+
+def ranges_are_told(beams: Sequence[PlacedBeam]) -> bool:
+    """Return whether messages tell that the range setting changed: then none changed untold."""
+    ranges = [one.beam.range_resolution * len(one.beam.intensities) for one in beams if len(one.beam.intensities)]
+    shortest, longest = np.quantile(ranges, _USUAL) if ranges else (0.0, 0.0)
+    return bool(longest > _CHANGED * shortest)
 
 
 def _standing(times: np.ndarray, angles: np.ndarray) -> List[Cause]:

@@ -58,13 +58,13 @@ class _Trial(NamedTuple):
 
 
 def without_faults(
-    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[Fault] = ()
+    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[Fault] = (), ranges_told: bool = False
 ) -> MotionFindings:  # fmt: skip
     """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
 
     Each fault is taken out and the run fitted again; the one with which echoes agree best is named. What a fit finds
     besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of scans and beams
-    show.
+    show. ranges_told: whether messages tell changes of the range setting: others are not looked for.
     """
     found, are_few = MotionFindings(run, fit, track), len(fit.node_times) < _FEWEST
     if run.parameters.node_search is not None or not found.is_told or (are_few and not suspected):
@@ -77,6 +77,7 @@ def without_faults(
             return found
         places = errors.places
         faults = suspected if are_few else [*_likely(errors), *suspected, *_of_sonar(found)]
+        faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not ranges_told]
         if len(found.causes) == _FAULTS or not faults:
             break
         best = _best(found, faults)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
-from benchmarks.faults import shortened
+from benchmarks.faults import shortened, source
 from benchmarks.harness import mapped_as
 from benchmarks.rare_faults import mount_tilted
 from made_recordings import touring
@@ -11,6 +11,7 @@ from made_recordings import touring
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, ranges_changed_at
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.self_check.beam_causes import ranges_are_told
 
 WHOLE, MIDDLE = shortened(touring(), 200.0), 100.0
 COMPASS = WHOLE.without_positions()
@@ -49,6 +50,20 @@ def test_points_lie_where_they_would_without_the_fault(fault, places):
     np.testing.assert_allclose(moved.points[:, :2], places, atol=1e-9)
 
 
+@pytest.mark.parametrize(
+    ("recording", "are_told"),
+    [
+        (WHOLE, False),
+        (broken.range_changed(WHOLE, MIDDLE, 0.5), False),
+        (broken.range_told(WHOLE, MIDDLE, 0.5), True),
+        (broken.range_told(WHOLE, MIDDLE, 0.5, seconds=2.0), False),
+    ],
+    ids=["none", "untold", "told", "a few beams cut short"],
+)
+def test_messages_tell_a_change_of_the_range_setting(recording, are_told):
+    assert ranges_are_told(recording.beams) == are_told
+
+
 @pytest.mark.parametrize(("size", "tried"), [(np.log(2.0), 2), (np.log(30.0), 0)])
 def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
     assert len(ranges_changed_at([1.0, 2.0], size)) == tried
@@ -72,6 +87,12 @@ def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, 
     assert found.findings.trust.line.startswith("trust: DOUBTFUL")
     truth = WHOLE.track.at(found.run.times) - WHOLE.track.poses[0] + recording.track.poses[0]
     assert np.hypot(*(found.run.best - truth)[:, :2].T).mean() < 0.5  # m
+
+
+@pytest.mark.long
+def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
+    short_at_first = broken.range_told(source("harbour compass", 400.0), 0.0, 0.385, 300.0)
+    assert mapped_as(short_at_first, "--refine").findings.trust.causes == []
 
 
 @pytest.mark.long
