@@ -1,7 +1,7 @@
 """What the echoes of a whole run say against its odometry and its sonar, and the run with that mended."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -67,18 +67,19 @@ class MotionFindings:
         """How far [m] the newest place may be turned about the run's first one by what nothing tells of the mounts."""
         return float(self.mounts * np.hypot(*(self.places[-1] - self.places[0])))
 
-    def with_course(self, path: Track, before: CourseFound = NOT_TOLD) -> "MotionFindings":
+    def with_course(self, path: Track, before: Optional[CourseFound] = None) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount.
 
-        before: what older scans told of it.
+        before: what older scans told of it; None of a whole run.
         """
         if not self.is_told:
             return self
-        course, places = self._course_of(path).after(before), self.places
-        # Where no course tells which of them is turned, it may be the sonar alone.
+        course, places = self._course_of(path).after(before or NOT_TOLD), self.places
+        # Where no course tells which of them is turned, it may be the sonar alone, and the odometry hide some of it.
+        # Live, a place that was reached soon is asked for in the map, which turns with it.
         direction = NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
-        if mounts and course != NOT_TOLD:
+        if mounts and (before is None or course != NOT_TOLD):
             turn = mounts = direction.hidden
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), turn)) - gone

@@ -183,9 +183,11 @@ def test_distances_in_feet_do_not_make_the_moves_of_a_vehicle_that_strafes_look_
 
 
 @pytest.mark.long
-def test_what_a_turned_dvl_hides_of_a_turned_sonar_is_stated():
-    strafing = source("turning", 600.0)  # its DVL is turned by 10 degrees
-    whole, turned = (mapped_as(one, "--refine") for one in (strafing, broken.mount_turned(strafing, 14.0)))
+@pytest.mark.parametrize(("tour", "seconds"), [("turning", 600.0), ("harbour", 140.0)])
+def test_what_a_turned_dvl_hides_of_a_turned_sonar_is_stated(tour, seconds):
+    """A vehicle that strafes, and one that was not seen for long; their DVLs are turned by 10 degrees."""
+    right = source(tour, seconds)
+    whole, turned = (mapped_as(one, "--refine") for one in (right, broken.mount_turned(right, 14.0)))
     assert outcome(turned, whole, named="").covered == 1.0
     assert "NOT MEASURED" in turned.findings.trust.line
     assert "direction of the sonar" in turned.findings.trust.line
