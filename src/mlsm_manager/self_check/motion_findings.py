@@ -70,13 +70,13 @@ class MotionFindings:
     def with_course(self, path: Track, before: Optional[CourseFound] = None) -> "MotionFindings":
         """Return the findings with what T_map_base says of the sonar's mount.
 
-        before: what older scans told of it; None of a whole run.
+        before: what older scans told of it; None offline, where the path is that of the whole run.
         """
         if not self.is_told:
             return self
         course, places = self._course_of(path).after(before or NOT_TOLD), self.places
         # Where no course tells which of them is turned, it may be the sonar alone, and the odometry hide some of it.
-        # Live, a place that was reached soon is asked for in the map, which turns with it.
+        # Live, where a short run is asked for its place in the map, that turns with the sonar and hides nothing.
         direction = NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
         if mounts and (before is None or course != NOT_TOLD):

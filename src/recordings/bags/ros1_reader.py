@@ -1,4 +1,4 @@
-"""Reads bags of ROS 1, also those whose recording was cut off: their index is missing."""
+"""Reads bags of ROS 1, also those without an index, whose recording was cut off."""
 
 import struct
 from collections import defaultdict
@@ -10,12 +10,11 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag1.reader import Header, IndexData, Reader, ReaderError, RecordType, read_uint32
 
 _NO_INDEX = ("not indexed", "index looks damaged")
-_NOT_WHOLE = (ReaderError, AssertionError, struct.error, ValueError)  # what reading such a record raises
+_NOT_WHOLE = (ReaderError, AssertionError, struct.error, ValueError)  # raised by a record that was cut off
 
 
 class Ros1Reader(Reader):
-    """A reader that finds out itself what a missing index would tell; of the last chunk, which nobody ended, it tells
-    nothing.
+    """Reads a bag by its index, or, where that is missing, chunk by chunk; a last chunk that is not whole is left out.
 
     is_cut: whether the index is missing.
     """
@@ -58,7 +57,7 @@ class Ros1Reader(Reader):
         position = self.bio.tell()
         chunk = self.read_chunk()
         if not chunk.datasize:
-            raise ReaderError("nobody ended this chunk")
+            raise ReaderError("this chunk was not finished")
         while self._next_type() is RecordType.IDXDATA:
             self.read_index_data(position, found)
             self.chunks[position] = chunk

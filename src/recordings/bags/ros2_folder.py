@@ -44,7 +44,7 @@ def readable_folder(path: Path) -> Iterator[Path]:
 
 
 def is_cut(path: Path) -> bool:
-    """Return whether nobody ended a recording."""
+    """Return whether a recording was never ended: a folder without metadata, or an MCAP file without its end."""
     return _metadata_of(path) is None if path.is_dir() else path.suffix == ".mcap" and not _is_ended(path)
 
 
@@ -63,7 +63,7 @@ def _by_number(file: Path) -> Tuple[int, str]:
 
 
 def _link_to(file: Path, folder: Path) -> Path:
-    """Return a link in `folder` to a file; to a copy with an end of an MCAP file that was cut off."""
+    """Return a link in `folder` to a file. An MCAP file that was cut off is copied there instead, and ended."""
     link = folder / file.name
     if file.suffix != ".mcap" or _is_ended(file):
         link.symlink_to(file)
