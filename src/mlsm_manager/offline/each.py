@@ -19,6 +19,7 @@ from mlsm_manager.offline.index_page import Job, Outcome, index_page
 from node_support.errors import needed
 from node_support.files import make_folder, write_whole
 from recordings.bags.bag import RecordingError
+from recordings.bags.ros2_folder import METADATA, STORAGES
 from recordings.makers_logs import is_makers_log
 
 TIMEOUT = 10.0
@@ -108,8 +109,7 @@ def _look(folder: Path) -> Tuple[Dict[str, str], bool]:
 
 
 INDEX = "index.html"
-_SUFFIXES = (".bag", ".active", ".mcap", ".db3")  # .bag.active: of a recording that nobody ended
-_METADATA = "metadata.yaml"  # of a ROS 2 folder
+_SUFFIXES = (".bag", ".active", *STORAGES)  # .bag.active: of a recording that was cut off
 _MESSAGES = "messages.txt"
 _SUMMARY = "summary.json"
 _PROGRAM = "from mlsm_manager.offline.program import main; main()"
@@ -121,7 +121,7 @@ def recordings_in(paths: Iterable[Path]) -> List[Path]:
     """Return the recordings among files, and in folders at any depth. Raises RecordingError where there is none."""
     found: List[Path] = []
     for path in paths:
-        if path.is_dir() and not (path / _METADATA).is_file():
+        if path.is_dir() and not (path / METADATA).is_file():
             found += sorted(one for one in path.rglob("*") if _is_recording(one))
         else:
             found.append(path)
@@ -133,8 +133,8 @@ def recordings_in(paths: Iterable[Path]) -> List[Path]:
 
 def _is_recording(path: Path) -> bool:
     if path.is_dir():
-        return (path / _METADATA).is_file()
-    in_folder = (path.parent / _METADATA).is_file()
+        return (path / METADATA).is_file()
+    in_folder = (path.parent / METADATA).is_file()
     return path.is_file() and not in_folder and (path.suffix.lower() in _SUFFIXES or is_makers_log(path))
 
 

@@ -61,7 +61,7 @@ class Bag:
     def notes(self) -> List[str]:
         """What whoever reads the bag should know, in sentences."""
         was_cut = is_cut(self.path) if self.is_ros2 else self._reader.is_cut
-        return ["nobody ended this recording; it is read as far as it is whole"] if was_cut else []
+        return ["the recording was cut off; it is read up to there"] if was_cut else []
 
     @property
     def is_ros2(self) -> bool:

@@ -14,7 +14,7 @@ from rosbags.interfaces import Connection
 from rosbags.rosbag2.storage_mcap import MCAPFile
 
 STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
-_METADATA, _INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
+METADATA, _INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
 _NEWEST_VERSION = 8  # of metadata that rosbags 0.9.23 reads; ROS 2 Jazzy writes 9
 _MAGIC, _FOOTER = b"\x89MCAP0\r\n", 2
 _NO_SUMMARY = bytes([_FOOTER, 20]) + bytes(7 + 20) + _MAGIC
@@ -32,14 +32,14 @@ def readable_folder(path: Path) -> Iterator[Path]:
     if metadata is not None and metadata["version"] <= _NEWEST_VERSION:
         yield path
         return
-    files = [file for file in path.iterdir() if file.name != _METADATA] if path.is_dir() else [path]
+    files = [file for file in path.iterdir() if file.name != METADATA] if path.is_dir() else [path]
     with TemporaryDirectory() as name:
         folder = Path(name)
         links = [_link_to(file.absolute(), folder) for file in files]
         if metadata is None:
             metadata = _counted(sorted((link for link in links if link.suffix in STORAGES), key=_by_number))
         # JSON is YAML too.
-        (folder / _METADATA).write_text(json.dumps({_INFORMATION: {**metadata, "version": _NEWEST_VERSION}}))
+        (folder / METADATA).write_text(json.dumps({_INFORMATION: {**metadata, "version": _NEWEST_VERSION}}))
         yield folder
 
 
@@ -51,7 +51,7 @@ def is_cut(path: Path) -> bool:
 def _metadata_of(path: Path) -> Optional[Dict[str, Any]]:
     """Return what metadata.yaml tells of a folder; None where it is not there, as before a recording ends."""
     try:
-        metadata = yaml.safe_load((path / _METADATA).read_text())[_INFORMATION]
+        metadata = yaml.safe_load((path / METADATA).read_text())[_INFORMATION]
         return metadata if isinstance(metadata["version"], int) and metadata["relative_file_paths"] else None
     except (OSError, ValueError, yaml.YAMLError, KeyError, TypeError):
         return None
@@ -98,7 +98,7 @@ def _end_of_whole_records(file: Path) -> int:
 def _counted(files: List[Path]) -> Dict[str, Any]:
     """Return the metadata of a bag with these files."""
     if not files:
-        raise FileNotFoundError(f"holds neither {_METADATA} nor a file {' or '.join(STORAGES)}")
+        raise FileNotFoundError(f"holds neither {METADATA} nor a file {' or '.join(STORAGES)}")
     storage, counts = STORAGES[files[0].suffix], Counter()
     for file in files:
         counts.update(_mcap_counts(file) if storage == "mcap" else _sqlite_counts(file))

@@ -171,14 +171,14 @@ def pings(path):
 
 @pytest.mark.parametrize("tail", [b"", bytes(4096)], ids=["cut", "filled with zeros"])
 @pytest.mark.parametrize("suffix", [".bag", ".mcap"])
-def test_of_a_recording_that_nobody_ended_is_read_what_is_whole(whole, tmp_path, suffix, tail):
+def test_a_recording_that_was_cut_off_is_read_up_to_there(whole, tmp_path, suffix, tail):
     data = whole[suffix].read_bytes()
     cut = tmp_path / f"cut{suffix}"
     cut.write_bytes(data[: int(0.7 * len(data))] + tail)
     (found, notes), (everything, _) = pings(cut), pings(whole[suffix])
     assert found == everything[: len(found)]
     assert 0.4 < len(found) / len(everything) < 0.8
-    assert notes == ["nobody ended this recording; it is read as far as it is whole"]
+    assert notes == ["the recording was cut off; it is read up to there"]
 
 
 def test_a_bag_whose_index_was_never_written_is_read(tmp_path):
