@@ -13,7 +13,6 @@ from node_support.geometry import wrapped
 
 _FEWEST_PAIRS = 3
 _CERTAIN = 100.0  # nats: a heading that is measured trembles, so that the pose itself says that nobody measured it
-_STRAIGHT = 2  # stretches of one heading, without positions: more are straight ways by a compass without noise
 _FARTHER = 1.4  # times as far as pairs of scans elsewhere lie apart
 _AT_ONE_PLACE = 0.4  # times as far: simulated vehicles that stopped had .06 to .25, one that went along a wall .57
 _REST, _AT_REST = 10.0, 0.3  # s, and m within which a vehicle that rests stays meanwhile
@@ -28,18 +27,19 @@ def standing_causes(scans: Sequence[Scan], track: Track, path: np.ndarray) -> Li
     Where it tells no positions, those in which it stands though the vehicle went on. path: (m, >= 2) m, the way that it
     went by the solver.
     """
-    stretches = list(standing_stretches(track))
+    stretches, is_measured = list(standing_stretches(track)), is_heading_measured(track)
     if not track.reports_positions:
         stuck = stuck_headings(track.with_poses(np.column_stack([path[:, :2], track.poses[:, 2]])))
         if stuck:
             return [of_stuck(*one) for one in stuck]
-    if not stretches or (not track.reports_positions and len(stretches) > _STRAIGHT):
+    # Without positions a heading that never trembles stands on every straight way.
+    if not stretches or not (track.reports_positions or is_measured):
         return []
     (times, apart), spans = _pairs(scans), track.times[np.array(stretches)]
     inside = [apart[(times[:, 0] >= begin) & (times[:, 1] <= end)] for begin, end in spans]
     # What such a stretch moved unseen lies between the two scans of a pair that reaches into it.
     outside = [(times[:, 1] <= begin) | (times[:, 0] >= end) for begin, end in spans]
-    elsewhere, is_measured = apart[np.all(outside, axis=0)], is_heading_measured(track)
+    elsewhere = apart[np.all(outside, axis=0)]
     return [
         _cause(*span, within, elsewhere, _missed_turn(track, *span))
         for stretch, span, within in zip(stretches, spans, inside)

@@ -150,6 +150,14 @@ def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehi
     assert standing_causes(still, stands, stands.poses) == []
 
 
+def test_a_compass_alone_without_noise_is_not_frozen_where_the_vehicle_goes_straight():
+    """Scans are 1.5 m apart on a straight way, and lie near each other while the vehicle turns for 40 s."""
+    times = np.arange(0.0, 101.0)
+    poses = np.maximum(times - 60.0, 0.0)[:, np.newaxis] * [0.0, 0.0, 0.02]
+    track = Track(times, poses)
+    assert standing_causes(_of_walls([0.0, 1.5] * 3 + [0.0, 0.1] * 2, track), track, poses) == []
+
+
 @pytest.mark.parametrize(("slowing", "named"), [(0.0, True), (5.0, False)])
 def test_a_measured_pose_that_stands_is_named_frozen_where_no_scans_tell_if_it_stood_suddenly(slowing, named):
     """From 40 to 60 s it stands; `slowing` s before and after, its speed goes down and up evenly."""
