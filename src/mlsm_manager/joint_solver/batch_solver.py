@@ -1,15 +1,15 @@
 """Fits a whole run at once, starting from what the live solver found."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, PostComparisons, add_comparisons, met_with, support
+from mlsm_manager.joint_solver.comparisons import support
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.loops import Loop, add_loops, loops_of
+from mlsm_manager.joint_solver.loops import Loop, loops_of
 from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.normal_equations import (
     POSE_COLUMNS,
@@ -19,14 +19,13 @@ from mlsm_manager.joint_solver.normal_equations import (
     NormalEquations,
     Residuals,
     State,
-    prior_of,
     solution_of,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior, Gaussian
-from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.prior_mixture import Gaussian
+from mlsm_manager.joint_solver.solution import Fixes, Solution
 from mlsm_manager.joint_solver.velocity_models import by_heading
-from mlsm_manager.joint_solver.weak_directions import across_weak
+from mlsm_manager.joint_solver.window import Window
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
@@ -110,7 +109,7 @@ def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     steps, converged = problem.converge()
     if fixed_steps is not None:
         problem = _Batch(run.with_state(problem.state))
-        problem.solve()
+        problem.solve(run.parameters.cut)
     poses, of_run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
     likelihood = problem.log_likelihood()
@@ -165,21 +164,16 @@ def _misfit(run: Solution) -> np.ndarray:
     return np.cumsum(np.append(0.0, np.repeat(of_turns / parts, parts)))
 
 
-class _Batch:
-    def __init__(self, solution: Solution, loops: Sequence[Loop] = (), fixed_steps: Optional[State] = None) -> None:
-        log, odometry, self.state = solution.log, solution.parameters.odometry, solution.state
-        self._run, self._odometry, self._parameters = solution, odometry, solution.parameters
-        self._layout = Layout(0, log.scan_count, odometry.width)
-        self._motion = log.node_motion(np.arange(log.scan_count + 1))
-        self._loops, self._start, self._fixed_steps = list(loops), self.state.copy(), fixed_steps
-        self._solution = None
-        self._move, self._is_begun = np.zeros(self._layout.size), False
-        self._points = log.surfaces.heard(0, log.scan_count)
-        self._lists: Optional[Neighbours] = None
-        scans, self._posts = np.arange(log.scan_count), None
-        if self._parameters.post_confidence:
-            self._posts = PostComparisons(log.posts, self._parameters, scans, np.ones(len(scans)))
-        self._prior = AdaptedPrior(odometry.mixture, solution.prior_term)
+class _Batch(Window):
+    """The problem of a whole run, which is a window that holds all of it; its state changes in place."""
+
+    _solved = staticmethod(solution_of)
+
+    def __init__(self, run: Solution, loops: Sequence[Loop] = (), fixed_steps: Optional[State] = None) -> None:
+        # Single scans that were found in the map as it was, and what was in it before, are not believed again.
+        super().__init__(replace(run, fixes=Fixes(), known=None), run.log.scan_count)
+        self._loops, self._start, self._fixed_steps = loops, self.state.copy(), fixed_steps
+        self._last_move, self._is_begun = np.zeros(self._layout.size), False
 
     def converge(self) -> Tuple[int, bool]:
         """Take as many steps as are needed, or allowed; return how many, and whether the last one was short enough."""
@@ -191,48 +185,30 @@ class _Batch:
 
     def step(self) -> float:
         """Take one Gauss-Newton step with momentum; return the root mean square of the plain step [m]."""
-        self.solve()
-        move = self._solution.step + _MOMENTUM * self._move
+        equations = self.solve(self._parameters.cut, self._loops, self._start)
+        # Its length in its own standard deviations: sqrt(step^T information step).
+        length = np.sqrt(max(0.0, -equations.gradient @ self._solution.step))
+        self._step_deviations = float(length) / float(np.sqrt(len(self.state.nodes)))
+        move = self._solution.step + _MOMENTUM * self._last_move
         self.state.nodes += self._nodes_of(move)
         self.state.run += move[self._layout.run_start :]
         # The first step makes equal what is constant along a run and which the live path found anew at each node.
-        self._move = move if self._is_begun else np.zeros_like(move)
+        self._last_move = move if self._is_begun else np.zeros_like(move)
         self._is_begun = True
         moves = self._nodes_of(self._solution.step)[:, :2]
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
-    def solve(self) -> None:
-        """Find the next step, and how well all is known, at the state."""
-        equations, parameters = self._expected(), self._parameters
-        add_loops(equations, self._layout, self._loops, self.state.nodes, self._start)
-        points, pairs = self.met()
-        add_comparisons(equations, self._layout, [(pairs, points, points)], parameters, parameters.cut)
-        if self._posts is not None:
-            self._posts.add(equations, self._layout, self._run.placed(self._posts.points), parameters.cut)
-        newest = self._layout.node_start(self._layout.last)
-        self._prior.add(equations, newest, self.state.nodes[-1], self._covariance)
-        self._solution = solution_of(equations)
-        # Its length in its own standard deviations: sqrt(step^T information step).
-        length = np.sqrt(max(0.0, -equations.gradient @ self._solution.step))
-        self._step_deviations = float(length) / float(np.sqrt(len(self.state.nodes)))
-
     def log_likelihood(self, across: float = np.nan) -> float:
-        """Return the log likelihood of the state: of echoes on surfaces, less that of odd motions."""
+        """Return the log likelihood of the state, see `likelihood_of`."""
         points, pairs = self.met()
         if not np.isnan(across):
-            later = self._run.log.node_times[points.scans] >= across
+            later = self._log.node_times[points.scans] >= across
             pairs = pairs._replace(importance=pairs.importance * (later[pairs.rows] != later[pairs.neighbours]))
         on_surfaces = support(pairs, points, points, self._parameters)
         return on_surfaces - 0.5 * self._expected().cost
 
     def _expected(self) -> NormalEquations:
-        equations = NormalEquations(self._layout.size)
-        odometry, parameters = self._odometry, self._parameters
-        value = np.append(self.state.nodes[0], self.state.run)
-        mean = np.append(odometry.first_node(), parameters.run_mean(self._run.log))
-        deviations = np.append(odometry.first_deviations(), parameters.run_deviations(self._run.log))
-        first = prior_of(self._layout.with_run(np.array([0]))[0], value - mean, deviations)
-        equations.add(first, *odometry.steps(self._layout.step_starts, self.state.nodes, self._motion))
+        equations = super()._expected()
         if self._fixed_steps is not None:
             now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
             _add_fixed_steps(equations, self._layout, now, fixed)
@@ -240,12 +216,8 @@ class _Batch:
 
     def met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
-        parameters = self._parameters
-        _, (points,) = across_weak([self._run.placed(self._points)], parameters)
-        if self._lists is None:
-            self._lists = Neighbours(points, parameters.group_scans)
-        met = met_with([self._lists], points, [points], parameters.cut, parameters)
-        return points, self._run.submaps.within(met)[0][0]
+        pairs, points, _ = self._surfaces_met(self._parameters.cut)[-1]
+        return points, pairs
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
@@ -254,10 +226,11 @@ class _Batch:
         """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""
         run = self._layout.run_start + np.arange(RUN_COLUMNS)
         nodes = np.arange(self._layout.last + 1)
-        poses = [self._pose_covariances(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
+        chunks = [self._layout.pose_columns(nodes[start : start + _CHUNK]) for start in range(0, len(nodes), _CHUNK)]
+        poses = np.concatenate([self._solution.covariances(chunk, self._held_covariance)[1] for chunk in chunks])
         places = self._motion.poses + self.state.nodes[:, :POSE_COLUMNS]
-        by_scale = scale_covariance(places, self._parameters.world_scale_deviation(self._run.log))
-        return np.concatenate(poses) + by_scale + self._by_heading(nodes), self._covariance(run)
+        by_scale = scale_covariance(places, self._parameters.world_scale_deviation(self._log))
+        return poses + by_scale + self._by_heading(nodes), self._own_covariance(run)
 
     def _by_heading(self, nodes: np.ndarray) -> np.ndarray:
         """Return what a compass that errs by the heading adds to the covariances of the poses of `nodes` (n,)."""
@@ -277,21 +250,7 @@ class _Batch:
 
     def newest_covariance(self) -> np.ndarray:
         """Return that of the newest node's and the run's unknowns (width + 2, width + 2)."""
-        return self._covariance(self._layout.with_run(np.array([self._layout.last]))[0])
-
-    def _pose_covariances(self, nodes: np.ndarray) -> np.ndarray:
-        columns = self._layout.pose_columns(nodes)
-        inverse = self._columns_of_inverse(columns.ravel()).reshape(self._layout.size, len(nodes), POSE_COLUMNS)
-        return np.stack([inverse[own, number] for number, own in enumerate(columns)])
-
-    def _covariance(self, columns: np.ndarray) -> np.ndarray:
-        """Return that of unknowns `columns` (k,), (k, k)."""
-        return self._columns_of_inverse(columns)[columns]
-
-    def _columns_of_inverse(self, columns: np.ndarray) -> np.ndarray:
-        unit = np.zeros((self._layout.size, len(columns)))
-        unit[columns, np.arange(len(columns))] = 1.0
-        return self._solution.solve(unit)
+        return self._own_covariance(self._layout.with_run(np.array([self._layout.last]))[0])
 
 
 def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndarray, fixed: np.ndarray) -> None:

@@ -7,7 +7,6 @@ import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.live_window import LiveWindow, superfluous
 from mlsm_manager.joint_solver.loops import Bend, ClosedLoop, Loop, confirmed, with_newest
 from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_newest
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
@@ -17,6 +16,7 @@ from mlsm_manager.joint_solver.places import PlaceCandidate, put_newest, put_sub
 from mlsm_manager.joint_solver.prior_mixture import Gaussian
 from mlsm_manager.joint_solver.run_log import RunLog, stacked, unstacked
 from mlsm_manager.joint_solver.solution import Fix, Fixes, Solution, Submaps
+from mlsm_manager.joint_solver.window import Window, superfluous
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
@@ -250,13 +250,15 @@ class LiveSolver:
         self.fixes.by_node[node] = fix
         self.state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([node]))[0, :YAW]
 
-    def _fitted(self, bend: Optional[Bend] = None) -> LiveWindow:
+    def _fitted(self, bend: Optional[Bend] = None) -> Window:
         """Return the newest nodes' problem after they were moved to its solution; loops only pull them near."""
-        window = LiveWindow(self.solution, self.estimates, self._frozen.covariances, self._start)
+        window = Window(
+            self.solution, self.parameters.free_nodes, self.estimates, self._frozen.covariances, self._start
+        )
         window.fit(bend)
         return window
 
-    def _closed(self, window: LiveWindow) -> LiveWindow:
+    def _closed(self, window: Window) -> Window:
         """Return the problem with the path bent to a place heard before, if the run then fits better."""
         self._loops = with_newest(self.solution, self._loops)
         loops = confirmed(self._loops, self.log.scan_count - 1)

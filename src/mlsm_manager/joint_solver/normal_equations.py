@@ -4,8 +4,9 @@ A node is a moment between two scans. Its first three columns correct the odomet
 pose plus x, y and yaw. An odometry model may add columns of its own. The run's unknowns come after all nodes.
 """
 
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from typing import NamedTuple, Sequence, Tuple, Union
+from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
 import scipy.linalg
@@ -165,22 +166,23 @@ class NormalEquations:
         return (whole[: self.size, : self.size] + _REGULARISATION * scipy.sparse.eye(self.size)).tocsc()
 
 
-def solution_of(equations: NormalEquations) -> "Union[DenseSolution, SparseSolution]":
+def solution_of(equations: NormalEquations) -> "EquationSolution":
     """Return the solution, found in the way that is faster for its size."""
     return DenseSolution(equations) if equations.size <= _MOST_DENSE else SparseSolution(equations)
 
 
-class DenseSolution:
-    """Solves normal equations of bounded size, and tells covariances."""
+class EquationSolution(ABC):
+    """Solves normal equations, and tells covariances. step: (size,) of the free unknowns.
 
-    def __init__(self, equations: NormalEquations) -> None:
-        information, self._to_held = equations.dense()
-        self._factor = scipy.linalg.cho_factor(information)
-        self.step = -scipy.linalg.cho_solve(self._factor, equations.gradient)
+    to_held: (size, h) the information between the free unknowns and the held ones.
+    """
 
+    step: np.ndarray
+    to_held: np.ndarray
+
+    @abstractmethod
     def solve(self, right: np.ndarray) -> np.ndarray:
         """Return the inverse of the information times `right` (size, k)."""
-        return scipy.linalg.cho_solve(self._factor, right)
 
     def covariances(self, columns: np.ndarray, held_covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the covariances (b, k, k) of b sets of unknowns, `columns` (b, k), where held ones err by
@@ -193,17 +195,29 @@ class DenseSolution:
         unit[columns.ravel(), np.arange(columns.size)] = 1.0
         gain = self.solve(unit)
         own = gain.reshape(-1, sets, each)[columns, np.arange(sets)[:, np.newaxis]]
-        by_held = (gain.T @ self._to_held).reshape(sets, each, -1)
+        by_held = (gain.T @ self.to_held).reshape(sets, each, -1)
         return own + by_held @ held_covariance @ by_held.transpose(0, 2, 1), own
 
 
-class SparseSolution:
-    """Solves normal equations of a whole run, and tells covariances."""
+class DenseSolution(EquationSolution):
+    """Of problems of bounded size."""
 
     def __init__(self, equations: NormalEquations) -> None:
+        information, self.to_held = equations.dense()
+        self._factor = scipy.linalg.cho_factor(information)
+        self.step = -scipy.linalg.cho_solve(self._factor, equations.gradient)
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        return scipy.linalg.cho_solve(self._factor, right)
+
+
+class SparseSolution(EquationSolution):
+    """Of long runs, in which nothing is held."""
+
+    def __init__(self, equations: NormalEquations) -> None:
+        self.to_held = np.zeros((equations.size, 0))
         self._factor = scipy.sparse.linalg.splu(equations.sparse())
         self.step = -self._factor.solve(equations.gradient)
 
     def solve(self, right: np.ndarray) -> np.ndarray:
-        """Return the inverse of the information times `right` (size, k)."""
         return self._factor.solve(right)

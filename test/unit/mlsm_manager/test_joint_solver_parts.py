@@ -12,11 +12,11 @@ from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.live_window import fading, joint_covariance, nearest_groups
 from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, Residuals, SparseSolution
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of, stacked, unstacked
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
+from mlsm_manager.joint_solver.window import fading, joint_covariance, nearest_groups
 from mlsm_manager.scan_matching.scan import Scan, Track
 
 

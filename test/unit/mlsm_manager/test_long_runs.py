@@ -9,9 +9,9 @@ from made_models import followed, solver_parameters
 from numba._dispatcher import compute_fingerprint
 
 from mlsm_manager.joint_solver import live_solver
-from mlsm_manager.joint_solver.live_window import nearest_groups, superfluous
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.window import nearest_groups, superfluous
 from mlsm_manager.localisation import joint_session
 from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMap

@@ -1,7 +1,10 @@
-"""The problem of one scan: the newest nodes against each other and against the nearest groups of frozen scans."""
+"""The problem of one scan: the newest nodes against each other and against the nearest groups of frozen scans.
+
+That of a whole run is a window in which all nodes are free.
+"""
 
 from dataclasses import dataclass, replace
-from typing import List, Optional, Sequence, Tuple
+from typing import Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -15,7 +18,7 @@ from mlsm_manager.joint_solver.comparisons import (
     weighted,
 )
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.loops import Bend, add_loops
+from mlsm_manager.joint_solver.loops import Bend, Loop, add_loops
 from mlsm_manager.joint_solver.map_support import agreement
 from mlsm_manager.joint_solver.motion_models import FIXED_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import (
@@ -24,8 +27,10 @@ from mlsm_manager.joint_solver.normal_equations import (
     POSE_COLUMNS,
     RANGE_SCALE,
     DenseSolution,
+    EquationSolution,
     Layout,
     NormalEquations,
+    State,
     prior_of,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -43,6 +48,7 @@ them overstates what is known: windows 41 scans apart settled on 0.68 and 0.86 s
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 _PULLED_STEPS = 5  # with the pull of loops: comparisons meet by then
 _MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
+_NOTHING_FROZEN = np.empty((0, POSE_COLUMNS, POSE_COLUMNS))
 
 
 @dataclass(frozen=True)
@@ -124,24 +130,28 @@ def joint_covariance(covariances: np.ndarray) -> np.ndarray:
     return joint.reshape(POSE_COLUMNS * len(covariances), POSE_COLUMNS * len(covariances))
 
 
-class LiveWindow:
-    """Moves the free nodes of a solution and its run's unknowns in place.
+class Window:
+    """Moves the free nodes of a solution and its run's unknowns in place; state: these and the frozen nodes."""
 
-    estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, f >= `first`. start: (3,)
-    standard deviations of the first node's pose, None where it defines the map.
-    """
+    _solved: Callable[[NormalEquations], EquationSolution] = DenseSolution
 
     def __init__(
         self,
         solution: Solution,
-        estimates: Sequence[LiveEstimate],
-        covariances: np.ndarray,
-        start: Optional[np.ndarray],
+        free_nodes: int,
+        estimates: Sequence[LiveEstimate] = (),
+        covariances: np.ndarray = _NOTHING_FROZEN,
+        start: Optional[np.ndarray] = None,
     ) -> None:
-        self._run, self._log, self._state = solution, solution.log, solution.state
+        """free_nodes: how many of the newest nodes may move besides the one before them; all others are frozen.
+
+        estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, at least as many as there
+        are. start: (3,) standard deviations of the first node's pose, None where it defines the map.
+        """
+        self._run, self._log, self.state = solution, solution.log, solution.state
         self._odometry, self._parameters = solution.parameters.odometry, solution.parameters
         last = self._log.scan_count
-        self._scans_per_group, first = self._parameters.group_scans, max(0, last - self._parameters.free_nodes)
+        self._scans_per_group, first = self._parameters.group_scans, max(0, last - free_nodes)
         self._recent = first // self._scans_per_group * self._scans_per_group
         around = solution.node_places(last)
         self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
@@ -155,7 +165,7 @@ class LiveWindow:
         columns = self._layout.with_run(np.array([first]))[0]
         self._believed = prior_of(columns, np.zeros(len(columns)), deviations, held)
         self._known, self._are_apart = solution.known, solution.submaps.numbers.any()
-        self._solution: Optional[DenseSolution] = None
+        self._solution: Optional[EquationSolution] = None
         self._comparisons = 0
         self._lists: List[Neighbours] = []
         self._met: List[Comparison] = []
@@ -192,25 +202,29 @@ class LiveWindow:
         """Move the free nodes to the solution; the loops of a bend only pull them near."""
         cut = self._parameters.wide_cut
         for _ in range(_PULLED_STEPS if bend else 0):
-            self._step(cut, bend)
+            self.solve(cut, bend.loops, bend.start)
+            self._move(self._solution.step)
         for _ in range(self._parameters.live_iterations):
-            self._step(cut)
+            self.solve(cut)
+            self._move(self._solution.step)
             cut = max(self._parameters.cut, _CUT_FACTOR * cut)
 
-    def _step(self, cut: float, bend: Optional[Bend] = None) -> None:
-        """Take one Gauss-Newton step with points up to `cut` [m] apart; the loops of a bend pull."""
+    def solve(self, cut: float, loops: Sequence[Loop] = (), start: Optional[State] = None) -> NormalEquations:
+        """Find the next Gauss-Newton step, and how well all is known, with points up to `cut` [m] apart.
+
+        loops: that pull, as found at the unknowns `start`. Return the equations that were solved.
+        """
         equations = self._expected()
         if self._run.fixes.by_node:
-            self._run.fixes.add(equations, self._layout, self._motion.poses, self._state.nodes[self._layout.first :])
+            self._run.fixes.add(equations, self._layout, self._motion.poses, self.state.nodes[self._layout.first :])
         met = self._surfaces_met(cut)
         self._comparisons = add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:
             self._comparisons += self._posts.add(equations, self._layout, self._run.placed(self._posts.points), cut)
-        self._prior.add(equations, self._newest_start, self._state.nodes[-1], self._own_covariance)
-        if bend is not None:
-            add_loops(equations, self._layout, bend.loops, self._state.nodes, bend.start)
-        self._solution = DenseSolution(equations)
-        self._move(self._solution.step)
+        self._prior.add(equations, self._newest_start, self.state.nodes[-1], self._own_covariance)
+        add_loops(equations, self._layout, loops, self.state.nodes, start)
+        self._solution = type(self)._solved(equations)
+        return equations
 
     def _own_covariance(self, columns: np.ndarray) -> np.ndarray:
         """Return the covariance (k, k) of unknowns (k,) if the frozen map had no error."""
@@ -219,10 +233,10 @@ class LiveWindow:
     def _expected(self) -> NormalEquations:
         """Return what is expected of the free unknowns without any echo."""
         equations, first = NormalEquations(self._layout.size, len(self._held_covariance)), self._layout.first
-        off = np.append(self._state.nodes[first], self._state.run) - self._mean
+        off = np.append(self.state.nodes[first], self.state.run) - self._mean
         if first:
             off[POSE] = 0.0
-        steps = self._odometry.steps(self._starts, self._state.nodes[first:], self._motion)
+        steps = self._odometry.steps(self._starts, self.state.nodes[first:], self._motion)
         equations.add(self._believed._replace(values=off), *steps)
         return equations
 
@@ -256,7 +270,7 @@ class LiveWindow:
         Neighbours are looked up once for all steps.
         """
         parameters = self._parameters
-        placed = self._frozen.moved_by_run(self._state.run), self._run.placed(self._recent_points)
+        placed = self._frozen.moved_by_run(self.state.run), self._run.placed(self._recent_points)
         weak, (frozen, recent) = across_weak(placed, parameters)
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
         self._lists = self._lists or [Neighbours(one, self._scans_per_group) for one in (frozen, recent)]
@@ -272,9 +286,9 @@ class LiveWindow:
     def _move(self, step: np.ndarray) -> None:
         run_start = self._layout.run_start
         nodes = step[:run_start].reshape(-1, self._layout.width)
-        self._state.nodes[self._layout.first :] += nodes
+        self.state.nodes[self._layout.first :] += nodes
         for column, most in _MOST_RUN_STEP.items():
-            self._state.run[column] += np.clip(step[run_start + column], -most, most)
+            self.state.run[column] += np.clip(step[run_start + column], -most, most)
 
     def log_likelihood(self) -> float:
         """Return that of the free nodes: of echoes on surfaces, less that of odd motions."""
@@ -298,12 +312,12 @@ class LiveWindow:
 
     def _estimate(self, number: int, covariance: np.ndarray, own_covariance: np.ndarray) -> LiveEstimate:
         """Return what is known of node `number`, at the end of the scan before it; covariances: as LiveEstimate's."""
-        T_odom_base, node = self._motion.poses[number - self._layout.first], self._state.nodes[number].copy()
+        T_odom_base, node = self._motion.poses[number - self._layout.first], self.state.nodes[number].copy()
         T_map_base = T_odom_base + node[POSE]
         share, distance, surfaces = agreement(self._met, number - 1, self._parameters)
         return LiveEstimate(
             time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
-            T_map_odom=move_of(T_odom_base, T_map_base), node=node, run=self._state.run.copy(),
+            T_map_odom=move_of(T_odom_base, T_map_base), node=node, run=self.state.run.copy(),
             covariance=covariance, own_covariance=own_covariance,
             world_scale_deviation=self._parameters.world_scale_deviation(self._log),
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
