@@ -6,6 +6,7 @@ pose plus x, y and yaw. An odometry model may add columns of its own. The run's 
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -48,12 +49,12 @@ class Layout:
     width: int
     group_of_node: np.ndarray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
-    @property
+    @cached_property
     def run_start(self) -> int:
         """Place of the run's first unknown."""
         return self.width * (self.last - self.first + 1)
 
-    @property
+    @cached_property
     def size(self) -> int:
         """Number of free unknowns."""
         return self.run_start + RUN_COLUMNS
@@ -62,7 +63,7 @@ class Layout:
         """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
 
-    @property
+    @cached_property
     def step_starts(self) -> np.ndarray:
         """(last - first,) places of the first columns of all free nodes but the last."""
         return self.width * np.arange(self.last - self.first)

@@ -1,11 +1,11 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, List, Tuple, Union
 
 import numpy as np
 
-from mlsm_manager.odometry.stalls import seconds_untold
+from mlsm_manager.odometry.steps import seconds_untold
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import seen_from
 
@@ -87,6 +87,8 @@ class Motion:
     held: (m,) s, for how long until then positions did not change at all while the heading did, or were lost: the
     odometry told nothing, or the vehicle was at rest.
 
+    positions: (m,) complex x + i y [m] in odom.
+
     "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
     """
 
@@ -94,11 +96,10 @@ class Motion:
     poses: np.ndarray
     ahead: np.ndarray
     held: np.ndarray
+    positions: np.ndarray = field(init=False)
 
-    @property
-    def positions(self) -> np.ndarray:
-        """(m,) complex x + i y [m] in odom."""
-        return as_complex(self.poses)
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "positions", as_complex(self.poses))
 
 
 class OdometryLog:

@@ -158,7 +158,7 @@ class Window:
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._recent_points = self._log.surfaces.heard(self._recent, last)
-        self._starts, self._newest_start = self._layout.step_starts, self._layout.node_start(last)
+        self._starts, self._newest_start = self._layout.step_starts, self._layout.run_start - self._layout.width
         self._motion = self._log.node_motion(np.arange(first, last + 1))
         self._mean, deviations = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
         held = self._layout.size + len(self._held_covariance) + np.arange(-POSE_COLUMNS, 0) if first else ()

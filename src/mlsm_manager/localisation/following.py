@@ -11,8 +11,7 @@ import numpy as np
 from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import ScanUpdate
-from mlsm_manager.odometry.continuous import ContinuousOdometry
-from mlsm_manager.odometry.mending import with_trembling_smoothed
+from mlsm_manager.odometry.continuous import ContinuousOdometry, with_trembling_smoothed
 from mlsm_manager.odometry.steps import MotionLimits, Step
 from mlsm_manager.scan_matching.prediction import OdometryErrors, advanced, advanced_path, carried_on
 from mlsm_manager.scan_matching.scan import Belief, Fading, MapCloud, Scan, Track

@@ -22,7 +22,7 @@ from mlsm_manager.localisation.joint_session import (
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.resumption import StoredRun, resumed_if_it_fits
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
-from mlsm_manager.odometry.mending import ReportedMotion
+from mlsm_manager.odometry.continuous import ReportedMotion
 from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted, updated_by_heading
 from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
@@ -242,9 +242,10 @@ class Joint(Estimator):
         None where echoes are plateaus: a single scan of these is metres less certain than its fit says.
         """
         session, belief = self._session, self.belief
-        if session is None or belief is None or scan.reference_time <= belief.time or session.solver.log.has_plateaus:
+        if session is None or belief is None or scan.reference_time <= belief.time:
             return None
-        if not _KNOWN_SCALE < session.solver.distance_deviation < np.inf:
+        solver = session.solver
+        if solver.log.has_plateaus or not _KNOWN_SCALE < solver.distance_deviation < np.inf:
             return None
         expected = predicted(belief, scan.track, scan.reference_time, self.errors)
         expected = updated_by_heading(expected, scan.reference_pose[2], self.errors.heading_deviation)
@@ -270,9 +271,10 @@ class Joint(Estimator):
         return update_of(scan, session, self.belief, perf_counter() - start)
 
     def _know(self, scan: Scan, session: JointSession) -> None:
-        newest = session.solver.estimates[-1]
+        solver = session.solver
+        newest = solver.estimates[-1]
         self.correction = scan.correction_to(newest.T_map_base)
-        self.belief = belief_of(newest, self.errors, session.solver.odometry.fading(newest.node))
+        self.belief = belief_of(newest, self.errors, solver.odometry.fading(newest.node))
 
     def _place(self, scan: Scan) -> ScanUpdate:
         self._end_session()

@@ -229,11 +229,11 @@ def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
     """
     if len(node_times) < 2:
         return []
-    newest, usual = node_times[-1], float(np.median(np.diff(node_times)))
-    count = min(round((scan.start - newest) / usual), _MOST_SCANS)
-    if scan.start - newest <= _LONGEST_PAUSE * usual:
+    newest, start, usual = node_times[-1], scan.start, float(np.median(np.diff(node_times)))
+    if start - newest <= _LONGEST_PAUSE * usual:
         return []
-    ends = np.linspace(newest, scan.start, count + 1)[1:].tolist()
+    count = min(round((start - newest) / usual), _MOST_SCANS)
+    ends = np.linspace(newest, start, count + 1)[1:].tolist()
     return [scan.without_points(end) for end in ends if end < scan.reference_time]
 
 

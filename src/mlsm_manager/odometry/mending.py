@@ -1,16 +1,11 @@
-"""What an odometry says of itself: how far it changed, and where a recorded one was wrong, which is mended: held poses,
-steps of compass and position, and poses that tremble.
-"""
+"""Where a recorded odometry was wrong, which is mended: held and repeated poses, steps, poses that tremble."""
 
 from typing import Iterator, List, NamedTuple, Sequence, Tuple
 
 import numpy as np
-import scipy.sparse
-import scipy.sparse.linalg
 
-from mlsm_manager.odometry.continuous import ContinuousOdometry
-from mlsm_manager.odometry.stalls import standing_stretches
-from mlsm_manager.odometry.steps import LEAST_STEP, MotionLimits, Step, StepKind, impossible_steps
+from mlsm_manager.odometry.continuous import ContinuousOdometry, with_trembling_smoothed
+from mlsm_manager.odometry.steps import LEAST_STEP, MotionLimits, Step, StepKind, impossible_steps, standing_stretches
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import rotated, wrapped
 
@@ -24,50 +19,6 @@ _TURNS = 200  # between poses, that show whether a heading is measured
 _MOSTLY, _FEWEST = 0.5, 20  # share of poses that repeat the one before, and others besides, where an odometry repeats
 _SLOW = 0.5  # s: what is repeated for less is as good as told evenly
 _TO_AND_FRO = 0.03  # share of neighbouring turns of a measured heading that have opposite signs
-_UNMOVED = 0.05  # m: a position that moves by less never changed, but for rounding and lever arms of a tilting base
-_UNTURNED = 0.02  # rad: a compass at rest says less, a vehicle that travels turns more
-
-
-class ReportedMotion:
-    """How far T_odom_base changed since it was first known: what an odometry tells of itself.
-
-    extent: m, of the positions along x or y. turned: rad, between the most different headings.
-    """
-
-    def __init__(self) -> None:
-        self._low, self._high = np.full(3, np.inf), np.full(3, -np.inf)
-        self._first_yaw = np.nan
-
-    def learn(self, track: Track) -> None:
-        poses = track.poses.copy()
-        if np.isnan(self._first_yaw):
-            self._first_yaw = poses[0, 2]
-        poses[:, 2] = wrapped(poses[:, 2] - self._first_yaw)
-        self._low = np.minimum(self._low, poses.min(axis=0))
-        self._high = np.maximum(self._high, poses.max(axis=0))
-
-    @property
-    def extent(self) -> float:
-        """By how much positions changed, m."""
-        return float(np.max(self._high[:2] - self._low[:2]))
-
-    @property
-    def turned(self) -> float:
-        """By how much the heading changed, rad; at most a turn."""
-        return float(self._high[2] - self._low[2])
-
-    @property
-    def has_positions(self) -> bool:
-        return self.extent > _UNMOVED
-
-    @property
-    def has_headings(self) -> bool:
-        return self.turned > _UNTURNED
-
-    @property
-    def only_turns(self) -> bool:
-        """Whether headings changed, and positions never did: nobody reports these."""
-        return self.has_headings and not self.has_positions
 
 
 class Mended(NamedTuple):
@@ -169,63 +120,3 @@ def _course(track: Track, start: float, end: float) -> float:
     poses = track.poses[near]
     moves = rotated(np.diff(poses[:, :2], axis=0), -poses[:-1, 2]).sum(axis=0)
     return float(np.arctan2(moves[1], moves[0])) if np.hypot(*moves) > _GOES else np.nan
-
-
-# Positions and headings that each err by themselves, as no vehicle moves.
-_TREMBLES = np.array([0.1, 0.1, np.radians(2.0)])  # m, rad: of a pose by itself; DVLs and compasses have a tenth of it
-_MOST = 20.0  # m, rad: beyond, poses do not tremble but make no sense
-_POSES = 100  # that tell it
-_OPPOSED = 0.6  # share of neighbours on opposite sides of a smooth path: .73 by noise, half in waves and turns
-_STEADY = 1e-3  # m, rad: noise of poses that do not tremble
-_AGILITY = np.array([0.1, 0.1, 0.05])  # m/s/sqrt(s), rad/s/sqrt(s): random walk of a small vehicle's speeds
-_OF_NORMAL = 1.48  # standard deviation of normal noise over its median size, which steps do not change
-
-
-def with_trembling_smoothed(track: Track) -> Tuple[Track, List[Step]]:
-    """Return a track whose positions and headings were smoothed where they tremble, and by how much they did; none
-    where nowhere.
-    """
-    poses, noise = track.poses.copy(), np.column_stack([_noise(track.times, column) for column in track.poses.T])
-    trembles = (noise > _TREMBLES) & (noise < _MOST)
-    for axis in np.flatnonzero(trembles.any(axis=0)):
-        own = trembles[:, axis]
-        smoothed = _smoothed(track.times, poses[:, axis], np.where(own, noise[:, axis], _STEADY), _AGILITY[axis])
-        poses[own, axis] = smoothed[own]
-    steps, moves, turns = [], trembles[:, :2].any(axis=1), trembles[:, 2]
-    if moves.any():
-        size = float(np.median(np.hypot(*noise[moves, :2].T)) / np.sqrt(2.0))
-        time = float(track.times[np.argmax(moves)])
-        steps.append(Step(StepKind.SCATTERS, time, time, size, 0.0))
-    if turns.any():
-        turn, time = float(np.median(noise[turns, 2])), float(track.times[np.argmax(turns)])
-        steps.append(Step(StepKind.TREMBLES, time, time, 0.0, turn))
-    return (track.with_poses(poses), steps) if steps else (track, [])
-
-
-def _noise(times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return the standard deviation (m,) of each of `values` (m,) by itself, against those just before and after it.
-
-    Zero where they go on as a vehicle does: then errors of neighbours are as often on one side as on both.
-    """
-    noise, steps = np.zeros(len(times)), np.diff(times)
-    share = steps[1:] / (steps[:-1] + steps[1:])
-    expected = share * values[:-2] + (1.0 - share) * values[2:]
-    apart = (values[1:-1] - expected) / np.sqrt(1.0 + share**2 + (1.0 - share) ** 2)
-    edges = np.linspace(0, len(apart), len(apart) // _POSES + 1).astype(int)
-    for first, last in zip(edges[:-1], edges[1:]):
-        near = apart[first:last]
-        if np.mean(near[1:] * near[:-1] < 0.0) > _OPPOSED:
-            # Besides its own poses a stretch has the first and the last one of the track, which have one neighbour.
-            own = slice(first and first + 1, last + 1 if last < len(apart) else None)
-            noise[own] = _OF_NORMAL * np.median(np.abs(near))
-    return noise
-
-
-def _smoothed(times: np.ndarray, values: np.ndarray, noise: np.ndarray, agility: float) -> np.ndarray:
-    """Return what is likeliest (m,) by `values` (m,) that err by `noise` (m,), if its rate walks by `agility`."""
-    steps = np.diff(times)
-    slopes = [1.0 / steps[:-1], -1.0 / steps[:-1] - 1.0 / steps[1:], 1.0 / steps[1:]]
-    changes = scipy.sparse.diags(slopes, [0, 1, 2], shape=(len(times) - 2, len(times)))
-    weights = scipy.sparse.diags(2.0 / (steps[:-1] + steps[1:]) / agility**2)
-    information = scipy.sparse.diags(noise**-2.0) + changes.T @ weights @ changes
-    return scipy.sparse.linalg.spsolve(information.tocsc(), values / noise**2)

@@ -7,7 +7,7 @@ import numpy as np
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
-from mlsm_manager.odometry.mending import ReportedMotion
+from mlsm_manager.odometry.continuous import ReportedMotion
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan

@@ -5,7 +5,7 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.odometry.mending import is_heading_measured, stuck_headings
-from mlsm_manager.odometry.stalls import standing_stretches, stands_suddenly
+from mlsm_manager.odometry.steps import standing_stretches, stands_suddenly
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, of_stuck
 from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs

@@ -199,7 +199,7 @@ class Carver:
         gone = self.is_outworn(findings.crossed, findings.crossed.crossed + findings.beams)
         occupied.remove(findings.rows[gone])
         noted = note_free(free, findings.free)
-        return CarveReport(len(findings.free), len(findings.rows), int(np.count_nonzero(gone))), noted
+        return CarveReport(len(findings.free.rows), len(findings.rows), int(np.count_nonzero(gone))), noted
 
     def findings(self, occupied: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray) -> BeamFindings:
         """Return what a scan says whose points (n, >= 3) are in `occupied` already.
