@@ -12,7 +12,7 @@ from sonar_processing.beams.beam import PlacedBeam
 _SECTORS, _CELL = 36, 0.2  # of the circle; m, of the range
 _SECTOR = 2.0 * np.pi / _SECTORS
 _MOSTLY = 0.8  # share of a sector's beams that hear it at one range, while the vehicle moves and all else does
-_NARROWEST = 2  # sectors
+_NARROWEST = 2  # sectors beside each other
 _WIDEST = 2.0 / 3.0  # of those looked at: a ring all around is the floor or the pulse, which echo_extractor removes
 _LONG = 1.2  # m: how far echoes of a wall reach along a beam, an echo's length and a cell
 _FEWEST = 10  # beams of a sector
@@ -32,9 +32,7 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     goes_along = _heard_always(beams, sectors)
     if goes_along is None or (_may_be_wall(goes_along) and (_width(track) < _LEAVES).all()):
         return list(beams), []
-    near = goes_along | np.roll(goes_along, 1, axis=0) | np.roll(goes_along, -1, axis=0)
-    near[:, 1:] |= near[:, :-1].copy()
-    near[:, :-1] |= near[:, 1:].copy()
+    near = _in_range(goes_along | _in_next_sectors(goes_along))
     metres, width = _CELL * (0.5 + np.nonzero(goes_along)[1].min()), goes_along.any(axis=1).sum() * 360 // _SECTORS
     text = f"something {metres:.1f} m away goes along with the vehicle, in {width} deg of the circle"
     left = [_without(one, near[sector]) for one, sector in zip(beams, sectors)]
@@ -69,7 +67,21 @@ def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[
     always = (loud > _MOSTLY * looked[:, np.newaxis]) & (looked >= _FEWEST)[:, np.newaxis]
     widest = _WIDEST * np.count_nonzero(looked >= _FEWEST)
     always[:, always.sum(axis=0) > widest] = False
+    always &= _in_range(_in_next_sectors(always))
     return always if _NARROWEST <= always.any(axis=1).sum() <= widest else None
+
+
+def _in_next_sectors(cells: np.ndarray) -> np.ndarray:
+    """Return which cells (sectors, cells) lie beside some of `cells`, as far away."""
+    return np.roll(cells, 1, axis=0) | np.roll(cells, -1, axis=0)
+
+
+def _in_range(cells: np.ndarray) -> np.ndarray:
+    """Return `cells` (sectors, cells) and those just nearer and just farther."""
+    wide = cells.copy()
+    wide[:, 1:] |= cells[:, :-1]
+    wide[:, :-1] |= cells[:, 1:]
+    return wide
 
 
 def _cells(placed: PlacedBeam) -> np.ndarray:

@@ -55,17 +55,37 @@ def test_what_goes_along_with_the_vehicle_is_left_out():
     assert without_companions(WHOLE.beams, WHOLE.track) == (WHOLE.beams, [])
 
 
-def test_a_wall_that_the_vehicle_follows_does_not_go_along():
-    angles = np.radians(np.arange(0.0, 3600.0, 3.0))
-    ranges = 4.0 / np.maximum(np.sin(angles), 0.01)
+def _beams(angles, ranges):
+    """Return a beam per second, with one echo each."""
     strengths = 100 * (np.abs(0.1 * np.arange(300) - ranges[:, np.newaxis]) < 0.3).astype(np.uint8)
-    beams = [
+    return [
         PlacedBeam(Beam(round(1e9 * number), "sonar", angle, heard, 0.1), np.eye(4), True)
         for number, (angle, heard) in enumerate(zip(angles, strengths))
     ]
+
+
+def test_a_wall_that_the_vehicle_follows_does_not_go_along():
+    angles = np.radians(np.arange(0.0, 3600.0, 3.0))
+    ranges = 4.0 / np.maximum(np.sin(angles), 0.01)
+    beams = _beams(angles, ranges)
     times = np.arange(float(len(beams)))
     straight = Track(times, np.column_stack([0.1 * times, 0.0 * times, 0.0 * times]))
     assert without_companions(beams, straight) == (beams, [])
+
+
+@pytest.mark.parametrize(
+    ("other_sector", "other_range", "goes_along"), [(6, 5.2, True), (6, 9.0, False), (20, 5.2, False)]
+)
+def test_what_goes_along_is_heard_in_sectors_beside_each_other(other_sector, other_range, goes_along):
+    """A vehicle that turns hears an echo at 5 m in the sixth of 36 sectors, one in another, elsewhere any range."""
+    angles, random = np.radians(np.arange(0.5, 3600.0, 3.0)), np.random.RandomState(1)
+    sectors = (np.degrees(angles) // 10 % 36).astype(int)
+    ranges = np.select(
+        [sectors == 5, sectors == other_sector], [5.0, other_range], random.uniform(2.0, 25.0, len(angles))
+    )
+    beams = _beams(angles, ranges)
+    turning = Track(np.arange(float(len(beams))), np.linspace(0.0, 1.0, len(beams))[:, np.newaxis] * [0.0, 0.0, 6.0])
+    assert bool(without_companions(beams, turning)[1]) == goes_along
 
 
 @pytest.mark.parametrize("moves", [True, False])
