@@ -14,8 +14,9 @@ _SECTOR = 2.0 * np.pi / _SECTORS
 _MOSTLY = 0.8  # share of a sector's beams that hear it at one range, while the vehicle moves and all else does
 _NARROWEST = 2  # sectors beside each other
 _WIDEST = 2.0 / 3.0  # of those looked at: a ring all around is the floor or the pulse, which echo_extractor removes
+_ELSEWHERE = 0.25  # share of the beams of all other sectors: in a tank, walls are as far wherever the vehicle turns
 _LONG = 1.2  # m: how far echoes of a wall reach along a beam, an echo's length and a cell
-_FEWEST = 10  # beams of a sector
+_FEWEST = 6  # times that the head looks into a sector: walls may happen to be as far in fewer
 _MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
 _LEAVES = np.array([5.0, np.pi / 2.0])  # m across its way, or rad: a vehicle that goes or turns less may follow a wall
 _MIDDLE = [(1.0 - _MOSTLY) / 2.0, (1.0 + _MOSTLY) / 2.0]  # quantiles that enclose the same share of the time
@@ -61,14 +62,20 @@ def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[
     """Return in which cells (sectors, cells) most beams are loud; None where that is no companion."""
     count = 1 + max(int(_cells(one).max()) for one in beams)
     loud, looked = np.zeros((_SECTORS, count)), np.bincount(sectors, minlength=_SECTORS)
+    entered = np.bincount(sectors[np.diff(sectors, prepend=-1) != 0], minlength=_SECTORS) >= _FEWEST
     for one, sector in zip(beams, sectors):
         strengths = one.beam.intensities
         loud[sector, np.unique(_cells(one)[strengths > strengths.max(initial=0) / 2])] += 1.0
-    always = (loud > _MOSTLY * looked[:, np.newaxis]) & (looked >= _FEWEST)[:, np.newaxis]
-    widest = _WIDEST * np.count_nonzero(looked >= _FEWEST)
-    always[:, always.sum(axis=0) > widest] = False
+    always = (loud > _MOSTLY * looked[:, np.newaxis]) & entered[:, np.newaxis]
+    widest = _WIDEST * np.count_nonzero(entered)
+    always[:, (always.sum(axis=0) > widest) | (_share(loud, looked, ~always) > _ELSEWHERE)] = False
     always &= _in_range(_in_next_sectors(always))
     return always if _NARROWEST <= always.any(axis=1).sum() <= widest else None
+
+
+def _share(loud: np.ndarray, looked: np.ndarray, chosen: np.ndarray) -> np.ndarray:
+    """Return which share (cells,) of the beams that look (sectors,) is loud in the `chosen` of (sectors, cells)."""
+    return (loud * chosen).sum(axis=0) / np.maximum(looked @ chosen, 1)
 
 
 def _in_next_sectors(cells: np.ndarray) -> np.ndarray:
