@@ -11,7 +11,7 @@ from node_support.geometry import rotated, wrapped
 _SECONDS, _GONE = 10.0, 1.0  # s of a stretch, and m in it from which on it has a direction
 _FEWEST = 10  # stretches
 _AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
-_STRAFES = np.radians(20.0)  # deviation of the course, beyond which the vehicle has no usual one; ahead: 5 to 13 deg
+_STRAFES, _MOSTLY = np.radians(30.0), 0.9  # so many stretches are less far aside where there is a usual course
 _VAGUE = np.radians(5.0)  # deviation of the mean course: sonar and DVL are mounted by eye to 6 deg; a marina's: 4.8 deg
 _CLEAR = 10.0  # deviations: so large a turn is told however vague it is
 _ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
@@ -79,9 +79,11 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     angles = np.arctan2(moves[:, 1], moves[:, 0])
     middle = float(np.angle(np.exp(1j * angles).sum()))
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
-    spread = 1.48 * float(np.median(np.abs(wrapped(angles - middle))))
-    deviation = np.hypot(1.25 * spread / np.sqrt(_worth(wrapped(angles - middle), spread)), _AHEAD)
-    strafes = bool(spread > _STRAFES or abs(middle) > largest)
+    aside = wrapped(angles - middle)
+    spread = 1.48 * float(np.median(np.abs(aside)))
+    deviation = np.hypot(1.25 * spread / np.sqrt(_worth(aside, spread)), _AHEAD)
+    # A vehicle that strafes may go one way for half of its time, and the median tells only that.
+    strafes = bool(np.quantile(np.abs(aside), _MOSTLY) > _STRAFES or abs(middle) > largest)
     is_clear = deviation <= _VAGUE or abs(middle) > _CLEAR * deviation
     return CourseFound(-middle, float(deviation) if is_clear and not strafes else np.inf, strafes)
 

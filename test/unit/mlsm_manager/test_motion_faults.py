@@ -209,6 +209,14 @@ def test_a_vehicle_strafes_only_where_it_was_seen_long_enough(stretches, strafes
     assert (found.is_told, found.strafes) == (False, strafes)
 
 
+@pytest.mark.parametrize(("others", "strafes"), [(1, False), (6, True)])
+def test_a_vehicle_that_often_goes_another_way_has_no_usual_course(others, strafes):
+    courses = np.radians([50.0] * (30 - others) + [15.0] * others)
+    places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
+    found = course_of(Track(10.0 * np.arange(30), np.column_stack([places, np.zeros(30)])), np.pi)
+    assert (found.is_told, found.strafes) == (not strafes, strafes)
+
+
 @pytest.mark.parametrize(("seconds", "is_told"), [(50.0, False), (5.0, True)])
 def test_a_course_that_is_told_no_better_than_mounts_are_set_tells_nothing_of_the_mount(seconds, is_told):
     """A vehicle that slips by up to 17 deg, every `seconds` to the other side."""
