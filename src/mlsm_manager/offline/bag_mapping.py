@@ -42,6 +42,7 @@ from mlsm_manager.self_check.causes import (
     Assumption,
     Cause,
     Fault,
+    Suspicion,
     of_steps,
     of_stuck,
     ranked,
@@ -143,8 +144,8 @@ def _refined(
         return None
     suspected = [*suspected, *(cause.fault for cause in causes if cause.fault is not None)]
     with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
-        told = ranges_are_told(recording.beams)
-        return refine(replayed, recording.track, parameters.map_settings(), suspected, told, bar.update)
+        suspicion = Suspicion(suspected, ranges_are_told(recording.beams))
+        return refine(replayed, recording.track, parameters.map_settings(), suspicion, bar.update)
 
 
 def _judged(

@@ -1,7 +1,7 @@
 """Fits a whole run after it is over, draws its map anew, and fits again to see whether the path depends on settings."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, List, Mapping, Sequence
+from typing import Callable, List, Mapping
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.scan_matching.scan import MapCloud, Track
-from mlsm_manager.self_check.causes import Fault
+from mlsm_manager.self_check.causes import Suspicion
 from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
@@ -58,13 +58,13 @@ def parts_of_refining(hypotheses: Hypotheses) -> int:
 
 
 def refine(
-    replayed: Replayed, track: Track, settings: MapSettings, suspected: Sequence[Fault] = (),
-    ranges_told: bool = False, done: Done = lambda: None,
+    replayed: Replayed, track: Track, settings: MapSettings, suspicion: Suspicion,
+    done: Done = lambda: None,
 ) -> Refined:  # fmt: skip
     """Return the run of all scans that the solvers have taken, fitted at once; live runs are where fits begin.
 
-    Of several odometries the likelier one is believed from then on. suspected: what pairs of scans and beams say is
-    wrong with sonar or odometry, which said `track`. ranges_told: as of `without_faults`.
+    Of several odometries the likelier one is believed from then on. suspicion: of sonar or odometry, which said
+    `track`.
     """
     hypotheses = replayed.hypotheses
     fits = []
@@ -75,7 +75,7 @@ def refine(
     closing = with_loops_closed(solver, best)
     done()
     run = solver.solution.with_state(closing.batch.state)
-    motion = without_faults(run, closing.batch, track, suspected, ranges_told)
+    motion = without_faults(run, closing.batch, track, suspicion)
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in replayed.scans:

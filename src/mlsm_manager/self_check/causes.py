@@ -20,6 +20,15 @@ _LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, beside
 Fault = Union[MotionFault, SonarFault]
 
 
+class Suspicion(NamedTuple):
+    """faults: that pairs of scans and beams show. ranges_told: whether messages tell changes of the range setting: no
+    other ones are looked for.
+    """
+
+    faults: Sequence[Fault]
+    ranges_told: bool = False
+
+
 def is_same(one: Optional[Fault], other: Fault) -> bool:
     """Return whether two faults are one: of most kinds a run has one only, but a compass may stick several times."""
     return one is not None and one.kind is other.kind and (one.kind is not FaultKind.STUCK or one.begin == other.begin)

@@ -21,7 +21,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
 )
 from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, is_same
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same
 from mlsm_manager.self_check.map_checks import scans_go_on
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.verdict import Answer
@@ -57,15 +57,13 @@ class _Trial(NamedTuple):
     gain: float
 
 
-def without_faults(
-    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[Fault] = (), ranges_told: bool = False
-) -> MotionFindings:  # fmt: skip
+def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Suspicion) -> MotionFindings:
     """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
 
     Each fault is taken out and the run fitted again; the one with which echoes agree best is named. What a fit finds
-    besides that lets the odometry err makes the position uncertain. suspected: faults that pairs of scans and beams
-    show. ranges_told: whether messages tell changes of the range setting: others are not looked for.
+    besides that lets the odometry err makes the position uncertain.
     """
+    suspected = suspicion.faults
     found, are_few = MotionFindings(run, fit, track), len(fit.node_times) < _FEWEST
     if run.parameters.node_search is not None or not found.is_told or (are_few and not suspected):
         return found
@@ -77,7 +75,7 @@ def without_faults(
             return found
         places = errors.places
         faults = suspected if are_few else [*_likely(errors), *suspected, *_of_sonar(found)]
-        faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not ranges_told]
+        faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not suspicion.ranges_told]
         if len(found.causes) == _FAULTS or not faults:
             break
         best = _best(found, faults)

@@ -12,7 +12,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
-from mlsm_manager.self_check.causes import Cause, Fault, of_steps, of_stuck, ranked, widened
+from mlsm_manager.self_check.causes import Cause, Fault, Suspicion, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.course import NOT_TOLD, CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import without_faults
@@ -116,5 +116,5 @@ def _not_followed(steps: Sequence[Step], begin: float) -> List[MotionFault]:
 def _motion_of(run: Solution, suspected: Sequence[Fault], before: CourseFound) -> MotionFindings:
     """Return what speaks against odometry and sonar of a run, and what its course says of the mount, or said before."""
     track = run.log.odometry.track_from(-np.inf)
-    motion = without_faults(run, fit_of(run), track, suspected)
-    return motion.with_course(track.with_poses(motion.run.path(track.times)), before)
+    motion = without_faults(run, fit_of(run), track, Suspicion(suspected))
+    return motion.with_newest_course(track.with_poses(motion.run.path(track.times)), before)

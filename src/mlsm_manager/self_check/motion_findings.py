@@ -1,7 +1,7 @@
 """What the echoes of a whole run say against its odometry and its sonar, and the run with that mended."""
 
 from dataclasses import dataclass, field, replace
-from typing import List, Optional, Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -67,19 +67,25 @@ class MotionFindings:
         """How far [m] the newest place may be turned about the run's first one by what nothing tells of the mounts."""
         return float(self.mounts * np.hypot(*(self.places[-1] - self.places[0])))
 
-    def with_course(self, path: Track, before: Optional[CourseFound] = None) -> "MotionFindings":
-        """Return the findings with what T_map_base says of the sonar's mount.
+    def with_course(self, path: Track) -> "MotionFindings":
+        """Return the findings of a whole run with what its path T_map_base says of the sonar's mount."""
+        return self._with(self._course_of(path), True) if self.is_told else self
 
-        before: what older scans told of it; None offline, where the path is that of the whole run.
+    def with_newest_course(self, path: Track, before: CourseFound) -> "MotionFindings":
+        """Return the findings of the newest scans likewise; before: what older ones told of the mount.
+
+        A short run that is asked for its place in the map turns with the sonar, and hides nothing.
         """
         if not self.is_told:
             return self
-        course, places = self._course_of(path).after(before or NOT_TOLD), self.places
-        # Where no course tells which of them is turned, it may be the sonar alone, and the odometry hide some of it.
-        # Live, where a short run is asked for its place in the map, that turns with the sonar and hides nothing.
-        direction = NOT_TOLD if course.is_told else self._direction
+        course = self._course_of(path).after(before)
+        return self._with(course, course != NOT_TOLD)
+
+    def _with(self, course: CourseFound, may_hide: bool) -> "MotionFindings":
+        """may_hide: whether the odometry hides some of the sonar's turn, where no course tells which is turned."""
+        places, direction = self.places, NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
-        if mounts and (before is None or course != NOT_TOLD):
+        if mounts and may_hide:
             turn = mounts = direction.hidden
         gone = places - places[0]
         aside = rotated(gone, np.full(len(gone), turn)) - gone
