@@ -5,7 +5,7 @@ messages; for axes x ahead, y to the right, z down the DVL A50's manual (https:/
 """
 
 from dataclasses import dataclass
-from typing import Any, Callable, Dict, Tuple
+from typing import Any, Callable, Dict, Optional, Tuple
 
 import numpy as np
 
@@ -50,12 +50,17 @@ class VelocityType:
             raise RefusedInput(VELOCITIES_REFUSED, f"{found.velocity} m/s, must be finite")
         return found
 
-    def in_vehicle(self, fields: VelocityFields, is_downward: bool = False) -> np.ndarray:
-        """Return the (3,) velocity along the axes, z up, of a vehicle on which the instrument is mounted straight.
+    def in_vehicle(
+        self, fields: VelocityFields, mount: Optional[np.ndarray], is_downward: bool = False
+    ) -> Tuple[np.ndarray, np.ndarray]:
+        """Return the (3,) velocity along the vehicle's axes, z up, and the place (2,) [m] on it that moves so.
 
-        is_downward: the vehicle's frames, in which some messages are, count z down.
+        mount: T_base_instrument (4, 4); None for an instrument that is mounted straight at the origin.
+        is_downward: the vehicle's own frames, in which some messages are, count z down.
         """
-        return fields.velocity * _DOWNWARD if self.is_downward or is_downward else fields.velocity
+        if mount is not None:
+            return mount[:3, :3] @ fields.velocity, mount[:2, 3]
+        return fields.velocity * _DOWNWARD if self.is_downward or is_downward else fields.velocity, np.zeros(2)
 
 
 def _twist(message: Any) -> VelocityFields:

@@ -104,11 +104,7 @@ class DeadReckoning:
         fields = kind.fields(self._classes.deserialised(message))
         stamp_ns = fields.stamp_ns or rospy.get_rostime().to_nsec()
         self._transforms.check_stamp(stamp_ns)
-        mount = self._mount(fields.frame_id, stamp_ns)
-        if mount is None:
-            self._reckon(stamp_ns, kind.in_vehicle(fields))
-        else:
-            self._reckon(stamp_ns, mount[:3, :3] @ fields.velocity, mount[:2, 3])
+        self._reckon(stamp_ns, *kind.in_vehicle(fields, self._mount(fields.frame_id, stamp_ns)))
 
     def _take_velocity(self, stamp_ns: int, twist: Twist) -> None:
         self.health.count("velocities in")

@@ -12,23 +12,13 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 import numpy as np
 
 from mlsm_manager.hovering.compiled_particles import Echoes, Pull, log_likelihoods, moves_onto_echoes
-from mlsm_manager.hovering.particles import (
-    ACROSS,
-    ALONG,
-    AROUND,
-    FACING,
-    FARTHEST,
-    Particles,
-    drawn,
-    echoes_of,
-    led,
-    squares_of,
-)
+from mlsm_manager.hovering.particles import ACROSS, ALONG, AROUND, FACING, FARTHEST, Particles, drawn, echoes_of, led
 from mlsm_manager.joint_solver.normal_equations import YAW
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.velocity_models import AHEAD, ASIDE
+from mlsm_manager.surface_map.blocks import squares_of
 from node_support.geometry import rotated
 
 _COUNT = 6000  # particles: with 1000 one simulated tour of two is lost

@@ -14,6 +14,7 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.surface_map.blocks import squares_of
 
 ACROSS = 0.7  # m: standard deviation of an echo across the surface of another
 ALONG = 1.5  # m: and along it, where it says less
@@ -182,12 +183,6 @@ def led(
     ends, new = draw
     ends[some], new[some] = particles.paths[some, -1] + duration * speeds, speeds
     return ends, new
-
-
-def squares_of(places: np.ndarray, side: float) -> np.ndarray:
-    """Return the number (n,), from 0 on, of the square of a grid that each of `places` (n, 2) lies in. side: m."""
-    cells = np.floor(places / side).astype(np.int64)
-    return np.unique(cells, axis=0, return_inverse=True)[1].ravel()
 
 
 def _turned(speeds: np.ndarray, turn: float) -> np.ndarray:

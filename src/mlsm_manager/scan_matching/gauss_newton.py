@@ -8,6 +8,7 @@ from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.point_equations import Normal, PointEquations, log_likelihood_gain
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
 from mlsm_manager.scan_matching.scan_path import POSE, PlanarMotion
+from mlsm_manager.surface_map.blocks import squares_of
 
 # Standard deviations at which the robust kernel bends: wide enough for a start one search cell off, narrow at the end.
 SCALES = (8.0, 4.0, 2.5)
@@ -111,7 +112,7 @@ class Refiner:
         normal = self._points.normal(fit.theta, SCALES[-1])
         gain, _ = self._points.scale_gain(normal, fit.inflation)
         evidence = PointEvidence(
-            *self._points.evidence(normal, gain, fit.inflation), _clusters(normal.correspondences.world),
+            *self._points.evidence(normal, gain, fit.inflation), squares_of(normal.correspondences.world, _CLUSTER),
             self._hidden_share(normal),
         )  # fmt: skip
 
@@ -130,7 +131,7 @@ class Refiner:
         return max(2.0 * float(np.average(shares, weights=normal.weight + _LEAST_WEIGHT)) - 1.0, 0.0)
 
     def _design_effect(self, normal: Normal) -> float:
-        cluster = _clusters(normal.correspondences.world)
+        cluster = squares_of(normal.correspondences.world, _CLUSTER)
         sums = np.stack([np.bincount(cluster, weights=column) for column in normal.gradient.T], axis=1)
         whitening = np.linalg.inv(normal.information + self._prior.information)
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
@@ -144,9 +145,3 @@ class Refiner:
             theta, covariance, log_likelihood_gain(normal, SCALES[-1]), inflation,
             self._prior.prior_cost(theta), normal.on_surface, normal.correspondences.distances, iterations, converged,
         )  # fmt: skip
-
-
-def _clusters(world: np.ndarray) -> np.ndarray:
-    """Return for points (n, 2) the number (n,) of the square of 3 m that each lies in."""
-    cell = np.floor(world / _CLUSTER).astype(np.int64)
-    return np.unique(cell[:, 0] * 2**32 + cell[:, 1], return_inverse=True)[1]

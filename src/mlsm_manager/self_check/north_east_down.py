@@ -3,9 +3,9 @@
 from typing import List, Optional, Sequence
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
+from mlsm_manager.self_check.compiled_distances import along_x, mean_distance
 from mlsm_manager.self_check.verdict import Verdict, percent
 from node_support.geometry import composed, seen_from
 
@@ -83,8 +83,10 @@ def _fits_turned_up(earlier: Scan, later: Scan) -> Optional[bool]:
     """Return whether two scans fit each other better with the odometry turned up; None where they do not tell."""
     if min(len(earlier), len(later)) < _FEWEST:
         return None
-    as_reported = _distance(_placed(earlier, _AS_REPORTED), _placed(later, _AS_REPORTED))
-    turned_up = _distance(_placed(earlier, _TURNED_UP), _placed(later, _TURNED_UP))
+    as_reported, turned_up = (
+        mean_distance(along_x(_placed(earlier, signs)), _placed(later, signs), _OTHER_SURFACE)
+        for signs in (_AS_REPORTED, _TURNED_UP)
+    )
     if max(as_reported, turned_up) < _CLEARLY * min(as_reported, turned_up):
         return None
     return turned_up < as_reported
@@ -95,10 +97,4 @@ def _placed(scan: Scan, signs: np.ndarray) -> np.ndarray:
     chosen = slice(None, None, -(-len(scan) // _MOST))
     points, poses = scan.points[chosen, :2], scan.track.at(scan.times[chosen])
     seen = seen_from(poses, np.column_stack([points, np.zeros(len(points))]))
-    return composed(poses * signs, seen)[:, :2]
-
-
-def _distance(one: np.ndarray, other: np.ndarray) -> float:
-    """Return the mean distance [m] of the points (n, 2) from their nearest neighbours among others (m, 2)."""
-    distances, _ = cKDTree(one).query(other)
-    return float(np.minimum(distances, _OTHER_SURFACE).mean())
+    return np.ascontiguousarray(composed(poses * signs, seen)[:, :2])

@@ -150,6 +150,11 @@ def keys_of(points: np.ndarray, resolution: float) -> np.ndarray:
     return cell_keys(cells_of(points, resolution))
 
 
+def squares_of(places: np.ndarray, side: float) -> np.ndarray:
+    """Return the number (n,), from 0 on, of the square of a grid that each of `places` (n, 2) lies in. side: m."""
+    return np.unique(keys_of(places, side), return_inverse=True)[1]
+
+
 def cells_of_keys(keys: np.ndarray) -> np.ndarray:
     """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
     low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000

@@ -217,7 +217,7 @@ def velocities_of(bag: Bag, topic: str, tree: FrameTree, base_frame: str, is_dow
     """
     kind = VELOCITY_TYPES[bag.topics[topic].type]
     rows: List[Tuple[int, np.ndarray, np.ndarray]] = []
-    mounts: Dict[str, Optional[np.ndarray]] = {}
+    mounts: Dict[str, Optional[np.ndarray]] = {base_frame: None}
     refused = 0
     for time, message in bag.messages(topic):
         try:
@@ -227,12 +227,7 @@ def velocities_of(bag: Bag, topic: str, tree: FrameTree, base_frame: str, is_dow
             continue
         if fields.frame_id not in mounts:
             mounts[fields.frame_id] = fixed_pose(tree, base_frame, fields.frame_id)
-        mount = mounts[fields.frame_id]
-        if mount is None or fields.frame_id == base_frame:
-            value, place = kind.in_vehicle(fields, is_downward), np.zeros(2)
-        else:
-            value, place = mount[:3, :3] @ fields.velocity, mount[:2, 3]
-        rows.append((fields.stamp_ns or time, value, place))
+        rows.append((fields.stamp_ns or time, *kind.in_vehicle(fields, mounts[fields.frame_id], is_downward)))
     rows.sort(key=lambda row: row[0])
     stamps, values, places = zip(*rows) if rows else ((), (), ())
     return Velocities(

@@ -44,7 +44,7 @@ def test_a_report_without_a_header_has_neither_stamp_nor_frame():
 )
 def test_a_dvl_s_own_axes_count_right_and_down(name, expected):
     kind = VELOCITY_TYPES[name]
-    assert kind.in_vehicle(kind.fields(MESSAGES[name])).tolist() == expected
+    assert kind.in_vehicle(kind.fields(MESSAGES[name]), None)[0].tolist() == expected
 
 
 @pytest.mark.parametrize(
