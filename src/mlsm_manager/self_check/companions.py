@@ -19,7 +19,6 @@ _LONG = 1.2  # m: how far echoes of a wall reach along a beam, an echo's length 
 _FEWEST = 6  # times that the head looks into a sector: walls may happen to be as far in fewer
 _MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
 _LEAVES = np.array([5.0, np.pi / 2.0])  # m across its way, or rad: a vehicle that goes or turns less may follow a wall
-_MIDDLE = [(1.0 - _MOSTLY) / 2.0, (1.0 + _MOSTLY) / 2.0]  # quantiles that enclose the same share of the time
 _LEFT = 0.5  # m: by which what is hidden behind it may matter
 
 
@@ -48,14 +47,15 @@ def _may_be_wall(goes_along: np.ndarray) -> bool:
 
 
 def _width(track: Track) -> np.ndarray:
-    """Return how far a vehicle went across its main direction [m], and by how much it turned [rad], most of the time.
+    """Return within which width across its main direction [m], and which turn [rad], a vehicle stays most of the time.
 
     A vehicle that follows a wall hears it at one range all the way.
     """
     places = track.poses[:, :2] - track.poses[:, :2].mean(axis=0)
     across = np.linalg.svd(places.T @ places)[0][:, -1]
-    spread = np.quantile(np.column_stack([places @ across, np.unwrap(track.poses[:, 2])]), _MIDDLE, axis=0)
-    return spread[1] - spread[0]
+    values = np.sort(np.column_stack([places @ across, np.unwrap(track.poses[:, 2])]), axis=0)
+    most = int(_MOSTLY * (len(values) - 1))
+    return (values[most:] - values[: len(values) - most]).min(axis=0)
 
 
 def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[np.ndarray]:
