@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import CERTAIN, Cause
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import PlacedBeam, beam_directions
 
 _SECTORS, _CELL = 36, 0.2  # of the circle; m, of the range
 _SECTOR = 2.0 * np.pi / _SECTORS
@@ -18,7 +18,7 @@ _ELSEWHERE = 0.25  # share of the beams of all other sectors: in a tank, walls a
 _LONG = 1.2  # m: how far echoes of a wall reach along a beam, an echo's length and a cell
 _FEWEST = 6  # times that the head looks into a sector: walls may happen to be as far in fewer
 _MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
-_LEAVES = np.array([5.0, np.pi / 2.0])  # m across its way, or rad: a vehicle that goes or turns less may follow a wall
+_LEAVES = np.array([5.0, np.pi / 2.0])  # m towards it, or rad: a vehicle that goes or turns less may follow a wall
 _LEFT = 0.5  # m: by which what is hidden behind it may matter
 
 
@@ -30,7 +30,10 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     angles = np.array([one.beam.angle for one in beams])
     sectors = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
     goes_along = _heard_always(beams, sectors)
-    if goes_along is None or (_may_be_wall(goes_along) and (_width(track) < _LEAVES).all()):
+    if goes_along is None:
+        return list(beams), []
+    towards = [one for one, sector in zip(beams, sectors) if goes_along[sector].any()]
+    if _may_be_wall(goes_along) and (_width(track, towards) < _LEAVES).all():
         return list(beams), []
     near = _in_range(goes_along | _in_next_sectors(goes_along))
     metres, width = _CELL * (0.5 + np.nonzero(goes_along)[1].min()), goes_along.any(axis=1).sum() * 360 // _SECTORS
@@ -46,14 +49,14 @@ def _may_be_wall(goes_along: np.ndarray) -> bool:
     return bool((goes_along.sum(axis=0) * _SECTOR <= widest).all())
 
 
-def _width(track: Track) -> np.ndarray:
-    """Return within which width across its main direction [m], and which turn [rad], a vehicle stays most of the time.
+def _width(track: Track, beams: Sequence[PlacedBeam]) -> np.ndarray:
+    """Return within which width [m] a vehicle stays most of the time where `beams` point, and within which turn [rad].
 
     A vehicle that follows a wall hears it at one range all the way.
     """
-    places = track.poses[:, :2] - track.poses[:, :2].mean(axis=0)
-    across = np.linalg.svd(places.T @ places)[0][:, -1]
-    values = np.sort(np.column_stack([places @ across, np.unwrap(track.poses[:, 2])]), axis=0)
+    angles, poses = np.array([one.beam.angle for one in beams]), np.stack([one.T_target_sonar for one in beams])
+    towards = beam_directions(angles, poses)[:, :2].mean(axis=0)
+    values = np.sort(np.column_stack([track.poses[:, :2] @ towards, np.unwrap(track.poses[:, 2])]), axis=0)
     most = int(_MOSTLY * (len(values) - 1))
     return (values[most:] - values[: len(values) - most]).min(axis=0)
 
