@@ -2,30 +2,23 @@
 
 import html
 from collections import Counter
-from enum import Enum
 from pathlib import Path
 from string import Template
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
-from mlsm_manager.self_check.verdict import Answer, too_few
+from mlsm_manager.self_check.verdict import Standing
 from node_support.errors import counted
 from node_support.files import package_folder
 
-
-class Standing(Enum):
-    """How a recording came out: words and colour."""
-
-    FINE = "all checks fine", "#2e7d32"
-    PARTLY = "partly measured", "#5c6bc0"
-    UNMEASURED = "not measured", "#757575"
-    DOUBTFUL = "doubtful", "#c77700"
-    NO_MAP = "no map", "#b3261e"
-
-    @property
-    def badge(self) -> str:
-        words, color = self.value
-        return f'<b style="background:{color}">{words}</b>'
+_NO_MAP = "no map"
+_COLORS = {
+    Standing.FINE.value: "#2e7d32",
+    Standing.PARTLY.value: "#5c6bc0",
+    Standing.UNMEASURED.value: "#757575",
+    Standing.DOUBTFUL.value: "#c77700",
+    _NO_MAP: "#b3261e",
+}
 
 
 class Job(NamedTuple):
@@ -43,27 +36,23 @@ class Outcome(NamedTuple):
     problem: str
 
     @property
-    def standing(self) -> Standing:
-        """How it came out, by the answers of its checks."""
-        if not self.summary:
-            return Standing.NO_MAP
-        checks = self.summary.get("checks", {})
-        answers = {Answer(check["answer"]) for check in checks.values()}
-        if Answer.DOUBTFUL in answers or self.summary.get("causes"):
-            return Standing.DOUBTFUL
-        if Answer.FINE not in answers or too_few(self.summary["matched"]):
-            return Standing.UNMEASURED
-        return Standing.FINE if answers == {Answer.FINE} else Standing.PARTLY
+    def standing(self) -> str:
+        """How it came out, in words."""
+        return self.summary.get("standing", Standing.UNMEASURED.value) if self.summary else _NO_MAP
 
 
 def index_page(outcomes: Sequence[Outcome], total: int) -> str:
     """Return the page of those of `total` recordings that are done."""
     found = Counter(outcome.standing for outcome in outcomes)
-    counts = " &nbsp; ".join(f"{found[one]} {one.badge}" for one in Standing if found[one])
+    counts = " &nbsp; ".join(f"{found[one]} {_badge(one)}" for one in _COLORS if found[one])
     title = f"{sum(bool(one.summary) for one in outcomes)} of {total} recordings mapped"
     waiting = f" &nbsp; {total - len(outcomes)} waiting" if len(outcomes) < total else ""
     page = Template((package_folder() / "web/templates/index.html").read_text(encoding="utf-8"))
     return page.substitute(title=title, counts=counts + waiting, rows="".join(map(_row, outcomes)))
+
+
+def _badge(standing: str) -> str:
+    return f'<b style="background:{_COLORS[standing]}">{standing}</b>'
 
 
 def _row(outcome: Outcome) -> str:
@@ -75,7 +64,7 @@ def _row(outcome: Outcome) -> str:
         picture = f'<a href="{link}/{page}">{shown}</a><small><a href="{link}/">files</a></small>'
     name, place = html.escape(outcome.job.recording.name), html.escape(str(outcome.job.recording.parent))
     told = "".join(f"<p>{html.escape(line)}</p>" for line in _lines(outcome))
-    return f"<tr><td>{picture}</td><td><p>{outcome.standing.badge} {name}</p>{told}<small>{place}</small></td></tr>\n"
+    return f"<tr><td>{picture}</td><td><p>{_badge(outcome.standing)} {name}</p>{told}<small>{place}</small></td></tr>\n"
 
 
 def _lines(outcome: Outcome) -> List[str]:

@@ -22,7 +22,7 @@ from mlsm_manager.report.figures import (
     sensor_health,
 )
 from mlsm_manager.report.mission import Mission
-from mlsm_manager.self_check.verdict import Answer, Verdict
+from mlsm_manager.self_check.verdict import Answer, Standing, Verdict
 from node_support.files import package_folder, write_whole
 
 _NEAR = 0.75  # share of a limit from which on a figure is worth a look
@@ -87,14 +87,13 @@ def write_report(path: Path, mission: Mission) -> None:
 def report_page(mission: Mission) -> str:
     """Return the page; it needs no other file and no network."""
     lights = [light_of(verdict) for verdict in mission.verdicts]
-    of_run = Light.RED if mission.is_doubtful else light_of_run(lights)
     checks = [(_lamp(light), escape(verdict.question or verdict.name), escape(sentence(verdict)), light.value)
               for verdict, light in zip(mission.verdicts, lights)]  # fmt: skip
     page = Template((package_folder() / "web/templates/report.html").read_text(encoding="utf-8"))
     return page.substitute(
         title=escape(mission.title),
         plotly=get_plotlyjs(),
-        summary=f"{_lamp(of_run)} {escape(mission.headline)}",
+        summary=f"{_lamp(light_of_run(mission.standing, lights))} {escape(mission.headline)}",
         facts=_table(("", ""), _words(mission.facts)),
         checks=_table(_CHECK_HEAD, checks, "checks") if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
@@ -163,9 +162,11 @@ def light_of(verdict: Verdict) -> Light:
     return Light.AMBER if worse > _NEAR else Light.GREEN
 
 
-def light_of_run(lights: List[Light]) -> Light:
-    """Return the light of the whole run: that of its worst check. What was not measured is worse than what is near."""
-    return next((light for light in (Light.RED, Light.GREY, Light.AMBER, Light.GREEN) if light in lights), Light.GREY)
+def light_of_run(standing: Standing, lights: List[Light]) -> Light:
+    """Return the light of the whole run; where all checks are fine that of the worst of their `lights`."""
+    if standing is not Standing.FINE:
+        return Light.RED if standing is Standing.DOUBTFUL else Light.GREY
+    return Light.AMBER if Light.AMBER in lights else Light.GREEN
 
 
 def sentence(verdict: Verdict) -> str:

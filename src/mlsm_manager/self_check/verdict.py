@@ -28,6 +28,15 @@ class Answer(Enum):
     NOT_MEASURED = "not measured"
 
 
+class Standing(Enum):
+    """How a run came out by all its checks."""
+
+    FINE = "all checks fine"
+    PARTLY = "partly measured"
+    UNMEASURED = "not measured"
+    DOUBTFUL = "doubtful"
+
+
 @dataclass(frozen=True)
 class Verdict:
     """One figure against its limit.

@@ -8,7 +8,8 @@ import pytest
 from programs import ROOT
 
 from mlsm_manager.offline.each import INDEX, Cluster, map_each, options_of_one, recordings_in
-from mlsm_manager.offline.index_page import Job, Outcome, Standing
+from mlsm_manager.offline.index_page import Job, Outcome
+from mlsm_manager.self_check.verdict import Standing
 from recordings.bags.bag import RecordingError
 
 
@@ -71,19 +72,16 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
 
 
 @pytest.mark.parametrize(
-    ("answers", "matched", "standing"),
+    ("summary", "standing"),
     [
-        ((), 7, Standing.UNMEASURED),
-        (("fine", "fine"), 6, Standing.UNMEASURED),
-        (("fine", "fine"), 7, Standing.FINE),
-        (("fine", "not measured"), 7, Standing.PARTLY),
-        (("not measured", "DOUBTFUL"), 0, Standing.DOUBTFUL),
+        ({}, "no map"),
+        ({"scans": 4}, "not measured"),  # nothing was checked
+        *(({"standing": one.value}, one.value) for one in Standing),
     ],
 )
-def test_nothing_is_called_fine_on_the_page_that_was_not_measured(answers, matched, standing):
-    checks = {str(number): {"answer": answer} for number, answer in enumerate(answers)}
-    own = {"checks": checks, "matched": matched}
-    assert Outcome(Job(Path("a.bag"), Path("a")), own, "").standing is standing
+def test_the_page_says_of_each_recording_what_its_own_summary_says(summary, standing):
+    outcome = Outcome(Job(Path("a.bag"), Path("a")), summary, "")
+    assert outcome.standing == standing
 
 
 def test_a_cluster_that_is_not_there_is_told_before_the_first_map(tmp_path, monkeypatch):

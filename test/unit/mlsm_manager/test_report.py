@@ -13,6 +13,7 @@ from hypothesis.extra.numpy import arrays
 from made_missions import mission, verdict
 
 from mlsm_manager.report.page import Light, light_of, light_of_run, slider_json
+from mlsm_manager.self_check.verdict import Standing
 
 MOST_BYTES = 15e6
 
@@ -29,11 +30,16 @@ def test_a_check_near_its_limit_is_amber_and_beyond_it_red(value, limit, more_is
     assert light_of(verdict(value, limit, more_is_better=more_is_better)) is light
 
 
-@given(st.lists(st.sampled_from(list(Light)), max_size=5))
-def test_a_run_is_as_good_as_its_worst_check(lights):
-    expected = next((one for one in (Light.RED, Light.GREY, Light.AMBER) if one in lights), Light.GREEN)
-    expected = expected if lights else Light.GREY
-    assert light_of_run(lights) is expected
+@pytest.mark.parametrize(
+    ("standing", "light"),
+    [
+        (Standing.FINE, Light.AMBER), (Standing.PARTLY, Light.GREY), (Standing.UNMEASURED, Light.GREY),
+        (Standing.DOUBTFUL, Light.RED),
+    ],
+)  # fmt: skip
+def test_the_light_of_a_run_says_what_its_headline_says(standing, light):
+    assert light_of_run(standing, [Light.GREEN, Light.AMBER]) is light
+    assert light_of_run(Standing.FINE, [Light.GREEN]) is Light.GREEN
 
 
 def test_the_slider_begins_with_the_first_scan_and_counts_from_the_start_of_the_run():

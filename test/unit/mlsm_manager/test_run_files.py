@@ -19,8 +19,8 @@ from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, ReplayParameters, r
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.trust import KnownPlaces, Trust
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import Assumption
-from mlsm_manager.self_check.verdict import Answer, Verdict
+from mlsm_manager.self_check.causes import Assumption, Cause
+from mlsm_manager.self_check.verdict import Answer, Standing, Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, matrices
@@ -135,6 +135,23 @@ def trust_of(*verdicts, times=(0.0, 10.0, 200.0), matched=7):
 )
 def test_the_headline_says_fine_only_of_what_was_measured(verdicts, matched, line):
     assert trust_of(*verdicts, matched=matched).line == f"trust: {line}"
+
+
+@pytest.mark.parametrize(
+    ("verdicts", "matched", "standing"),
+    [
+        ((), 7, Standing.UNMEASURED),
+        ((FINE, FINE), 6, Standing.UNMEASURED),
+        ((FINE, FINE), 7, Standing.FINE),
+        ((FINE, SHORT), 7, Standing.PARTLY),
+        ((SHORT, FIRING), 0, Standing.DOUBTFUL),
+    ],
+)
+def test_a_run_is_fine_only_if_all_was_measured_and_what_was_wrong_is_mended(verdicts, matched, standing):
+    trust = trust_of(*verdicts, matched=matched)
+    mended = Cause("the odometry stepped", 9.0, 5.0, is_mended=True)
+    assert trust.standing is replace(trust, causes=[mended]).standing is standing
+    assert replace(trust, causes=[replace(mended, is_mended=False)]).standing is Standing.DOUBTFUL
 
 
 def test_no_check_is_fine_of_a_path_that_was_only_assumed():
