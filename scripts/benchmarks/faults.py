@@ -48,9 +48,10 @@ def source(name: str, seconds: float) -> Recording:
     return shortened(simulated(f"{_TOURS[name]}_tour").with_dvl(1), seconds)
 
 
-def shortened(recording: Recording, seconds: float) -> Recording:
-    """Return the first seconds of a recording."""
-    return _between(recording, recording.track.times[0], recording.track.times[0] + seconds)
+def shortened(recording: Recording, seconds: float, begin: float = 0.0) -> Recording:
+    """Return some seconds of a recording, from `begin` [s] on."""
+    start = recording.track.times[0] + begin
+    return _between(recording, start, start + seconds)
 
 
 def ending(recording: Recording, seconds: float) -> Recording:

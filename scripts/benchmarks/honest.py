@@ -9,6 +9,8 @@ from functools import partial
 from pathlib import Path
 from typing import Callable, Dict, List, Set
 
+import numpy as np
+
 from benchmarks.faults import shortened
 from benchmarks.harness import MARINA, WHOLE_MARINA, benchmark_parser, compass_alone, mapped_as, recorded
 from benchmarks.live_faults import told_by
@@ -74,19 +76,28 @@ def main() -> None:
     parser.add_argument("--rows", default=".", metavar="REGEX", help="of which recordings; default: all")
     parser.add_argument("--seeds", type=int, nargs="+", default=[12], help="of tours (default: 12)")
     parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
+    parser.add_argument("--begins", type=float, nargs="+", default=[0.0], metavar="SECONDS", help="of what is mapped")
     arguments = parser.parse_args()
     runs, offline, live = 0, 0, 0
     for name, made in recordings(arguments.seeds).items():
-        if re.search(arguments.rows, name):
-            said = _said(name, made, arguments.seconds)
+        for begin in arguments.begins if re.search(arguments.rows, name) else []:
+            said = _said(f"{name}, {begin:g} s", partial(_window, made, arguments.seconds, begin))
             runs, offline, live = runs + 1, offline + bool(said[0]), live + bool(said[1])
     print(f"{runs} recordings: {offline} with a cause offline, {live} live")
 
 
-def _said(name: str, made: Callable[[], Recording], seconds: float) -> List[Set[str]]:
-    """Print and return what is said of the first seconds of a recording, offline and live."""
+def _window(made: Callable[[], Recording], seconds: float, begin: float) -> Recording:
+    recording = made()
+    lasts = float(np.ptp(recording.track.times))
+    if begin >= lasts:
+        raise RecordingError(f"it lasts {lasts:.0f} s")
+    return shortened(recording, seconds, begin)
+
+
+def _said(name: str, made: Callable[[], Recording]) -> List[Set[str]]:
+    """Print and return what is said of a recording, offline and live."""
     try:
-        recording = shortened(made(), seconds)
+        recording = made()
         mapped = mapped_as(recording, "--refine")
         said = [offline_causes(mapped), live_causes(recording, mapped.odometry.kind)]
     except RecordingError as refused:
