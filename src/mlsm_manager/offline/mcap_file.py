@@ -6,7 +6,7 @@ from typing import Any, List
 import numpy as np
 
 from mlsm_manager.report.mission import Mission, Path
-from mlsm_manager.self_check.verdict import Answer
+from mlsm_manager.self_check.verdict import Answer, Standing
 from mlsm_manager.surface_map.export.rasters import occupancy
 from node_support.files import whole_file
 from recordings.bags.messages import Placing, write_pose
@@ -14,7 +14,9 @@ from recordings.bags.writers import McapWriter
 
 _MAP, _VEHICLE = "map", "base_link"
 _FLOAT32 = 7  # of PointField
-_LEVELS = {Answer.FINE: 0, Answer.DOUBTFUL: 1, Answer.NOT_MEASURED: 3}  # of DiagnosticStatus: OK, WARN, STALE
+_OK, _WARN, _STALE = 0, 1, 3  # of DiagnosticStatus
+_LEVELS = {Answer.FINE: _OK, Answer.DOUBTFUL: _WARN, Answer.NOT_MEASURED: _STALE}
+_LEVELS_OF_RUNS = {Standing.FINE: _OK, Standing.PARTLY: _STALE, Standing.UNMEASURED: _STALE, Standing.DOUBTFUL: _WARN}
 
 
 def write_mcap(file: File, mission: Mission, picture: File) -> None:
@@ -78,7 +80,7 @@ def _path(bag: McapWriter, stamp_ns: int, path: Path) -> Any:
 
 def _checks(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
     message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
-    message.status.append(_status(bag, "trust", 0, mission.headline))
+    message.status.append(_status(bag, "trust", _LEVELS_OF_RUNS[mission.standing], mission.headline))
     for verdict in mission.verdicts:
         message.status.append(_status(bag, verdict.name, _LEVELS[verdict.answer], verdict.line()))
     return message

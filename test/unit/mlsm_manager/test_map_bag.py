@@ -17,6 +17,7 @@ from heading_only import reduce_bag
 from map_bag_runs import refused, run, summary_of
 from programs import BASIN, ROOT
 
+from mlsm_manager.self_check.verdict import Standing
 from mlsm_manager.surface_map.map_file import Layer, read_map
 from recordings.bags.bag import Bag
 
@@ -210,6 +211,9 @@ def test_an_mcap_file_holds_the_mission_in_messages_that_bring_their_types(twice
         assert blocks.width == summary_of(twice)["blocks"]
         covariances = [message.pose.covariance[[0, 7]] for _, message in bag.messages("/pose")]
         assert np.all(np.array(covariances) > 0.0)
+        (checks,) = [message for _, message in bag.messages("/checks")]
+        is_ok, standing = checks.status[0].level == 0, Standing(summary_of(twice)["standing"])
+        assert is_ok == (standing is Standing.FINE)
 
 
 def test_the_report_shows_the_way_of_each_recording(twice):
