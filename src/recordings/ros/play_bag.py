@@ -17,6 +17,7 @@ from node_support.help import CommandLine, positive
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import LAST_MESSAGES_ARRIVE, StartError, run
 from node_support.timing import Pace
+from sonar_processing.beams.beam_types import BEAM_TYPES
 
 _CLOCK_PERIOD = 0.01  # s of wall time: as rosbag play does
 _WAIT_STEP = 0.05  # s: soon enough for a person
@@ -129,6 +130,9 @@ def read_messages(options: Namespace) -> List[Played]:
         with rosbag.Bag(str(options.bag)) as bag:
             found = bag.get_type_and_topic_info().topics
             chosen = [topic for topic in found if not options.topics or topic in options.topics]
+            if not any(found[topic].msg_type in BEAM_TYPES for topic in chosen):
+                held = ", ".join(f"{topic} ({found[topic].msg_type})" for topic in sorted(found))
+                rospy.logwarn("%s: no topic that is played holds beams; the bag has %s", options.bag, held)
             played = [one for topic in chosen for one in _messages(bag, topic)]
     except rosbag.ROSBagUnindexedException:
         raise StartError(f"{options.bag}: not indexed, the recording was cut off; run: rosbag reindex") from None

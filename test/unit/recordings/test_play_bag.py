@@ -11,6 +11,7 @@ from tf2_msgs.msg import TFMessage
 
 from node_support.ros.node import StartError
 from recordings.ros.play_bag import play_arguments, read_messages
+from underwater_map_construction.msg import SonarScanLine
 
 
 def _transform(parent, child):
@@ -51,6 +52,21 @@ def test_messages_come_in_the_order_of_their_times(bag):
 
 def test_only_the_chosen_topics_are_read(bag):
     assert {one.topic for one in _read(bag, "--topics", "depth", "/none")} == {"depth"}
+
+
+def test_a_bag_whose_beams_are_not_played_says_which_topics_it_has(bag, caplog):
+    _read(bag, "--topics", "/tf")
+    assert caplog.messages == [
+        f"{bag}: no topic that is played holds beams; the bag has /tf (tf2_msgs/TFMessage), depth (std_msgs/Float64), "
+        "odom (nav_msgs/Odometry)"
+    ]
+
+
+def test_nothing_is_said_where_beams_are_played(tmp_path, caplog):
+    with rosbag.Bag(str(tmp_path / "beams.bag"), "w") as written:
+        written.write("/sonar/raw", SonarScanLine(), rospy.Time.from_sec(1.0))
+    _read(tmp_path / "beams.bag")
+    assert caplog.messages == []
 
 
 def test_ned_turns_the_vehicle_in_odom_and_leaves_the_mount(bag):
