@@ -6,7 +6,7 @@ all. Here a whole path is known, and each step weighs the whole run (basin hoppi
 """
 
 from dataclasses import dataclass, field, replace
-from typing import Callable, Iterator, List, Sequence
+from typing import Callable, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
@@ -18,6 +18,9 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of, fit_path
 from mlsm_manager.joint_solver.estimate import misfit_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.run_log import RunLog
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.sonar_trials import SonarFault
 
 _REACH, _STEP = 40.0, 1.0  # m: shifts that are weighed; a post tells to about a metre
 _ANY, _SMALL = (1.0, _REACH), (2.0, 7.0)  # m: far ones reach another place, small ones climb where far ones fit nothing
@@ -179,7 +182,8 @@ _ALL_TURNS = 200  # that particles reach back: all of a run of 50 minutes
 _LIKELY = 20.0  # of log likelihood, by which a fit must be worse to count e times less, since neighbours share errors
 _LONGEST_SHIFTED = 60  # turns, about 15 minutes: the time that shifts take grows with their square
 _CLEARLY = 3.0  # of log likelihood, by which shifted paths must be better than the best fit before, or it is kept
-# Times the likelihood: 1.01 on tours ahead, where the wider profile fits noise; 1.25 and more on others.
+# Times the likelihood: 1.01 on tours ahead, where the wider profile fits noise, and 1.04 where ranges changed besides;
+# 1.25 and more on others, whatever changes of ranges are tried.
 _STRAFES = 1.05
 
 
@@ -198,12 +202,20 @@ def solved_best(live: LiveSolver) -> BatchResult:
     return _best(live, fits, np.array(likelihoods))
 
 
-def strafes(ahead: LiveSolver, strafing: LiveSolver) -> bool:
-    """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans."""
-    times = strafing.log.node_times
-    echoes = echoes_of_run(strafing.log, strafing.parameters)
-    one, other = (log_likelihood(echoes, run.solution.path(times)[:, :2]) for run in (ahead, strafing))
-    return other > _STRAFES * one
+def strafes(
+    ahead: LiveSolver, strafing: LiveSolver, with_other_ranges: Sequence[Tuple[SonarFault, Solution]] = ()
+) -> bool:
+    """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans.
+
+    with_other_ranges: changes of ranges, without which scans of a vehicle that goes ahead may go on, and such runs.
+    """
+
+    def likelihood(run: Solution, log: RunLog) -> float:
+        return log_likelihood(echoes_of_run(log, strafing.parameters), run.path(log.node_times)[:, :2])
+
+    log = strafing.log
+    others = [likelihood(run, fault.logged(log)) for fault, run in with_other_ranges]
+    return likelihood(strafing.solution, log) > _STRAFES * max([likelihood(ahead.solution, log), *others])
 
 
 def _found(live: LiveSolver, seed: int) -> State:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
-from typing import Any, Callable, Dict, Mapping, Optional
+from typing import Any, Callable, Dict, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from mlsm_manager.joint_solver.position_models import (
     ThrusterFactors,
     UnsureFactors,
 )
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.files import package_folder
@@ -186,11 +188,16 @@ def fitted(solver: LiveSolver) -> BatchResult:
     return solved_best(solver)
 
 
-def strafes(ahead: LiveSolver, hovering: LiveSolver) -> bool:
-    """Return whether echoes are clearly likelier with HOVERING than with HEADING. Both solvers took the same scans."""
+def strafes(
+    ahead: LiveSolver, hovering: LiveSolver, with_other_ranges: Sequence[Tuple[SonarFault, Solution]] = ()
+) -> bool:
+    """Return whether echoes are clearly likelier with HOVERING than with HEADING. Both solvers took the same scans.
+
+    with_other_ranges: changes of ranges and the runs with HEADING without them.
+    """
     from mlsm_manager.hovering import best_fit
 
-    return best_fit.strafes(ahead, hovering)
+    return best_fit.strafes(ahead, hovering, with_other_ranges)
 
 
 @lru_cache(maxsize=None)

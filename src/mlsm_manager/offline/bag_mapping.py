@@ -50,7 +50,7 @@ from mlsm_manager.self_check.causes import (
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
-from mlsm_manager.self_check.fault_trials import goes_on_with_other_ranges
+from mlsm_manager.self_check.fault_trials import with_other_ranges
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
@@ -192,12 +192,11 @@ def _followed(
     asked = odometry.kind is OdometryKind.HEADING and not _is_named(options) and replayed.solver is not None
     if not asked or not may_strafe(replayed.solver.solution):
         return odometry, parameters, replayed
-    if goes_on_with_other_ranges(replayed.solver.solution, recording.track):
-        return odometry, parameters, replayed
     other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
     changed = with_odometry(extracting, other.kind, options.fixed)
     again = _replayed(recording, scans, changed)
-    if again.solver is not None and strafes(replayed.solver, again.solver):
+    ranges = [] if ranges_are_told(recording.beams) else with_other_ranges(replayed.solver.solution, recording.track)
+    if again.solver is not None and strafes(replayed.solver, again.solver, ranges):
         return other, changed, again
     return odometry, parameters, replace(replayed, strafing=again.solver)
 

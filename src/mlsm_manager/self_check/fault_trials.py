@@ -1,12 +1,11 @@
 """Takes faults of odometry and sonar out of a whole run, one after the other, and names those without which it fits."""
 
 from dataclasses import replace
-from typing import List, NamedTuple, Sequence
+from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
-from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_turned, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
@@ -22,9 +21,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
 from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same
-from mlsm_manager.self_check.map_checks import scans_go_on
 from mlsm_manager.self_check.motion_findings import MotionFindings
-from mlsm_manager.self_check.verdict import Answer
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
@@ -42,7 +39,6 @@ _TURNED = np.radians(15.0)  # between turns that are tried of a vehicle whose co
 _NATS_TURNED = 15.0  # by which one must be likelier than none: in a marina a wrong one of 24 was so by 4 nats
 _MORE = 1.05  # times as much: true distances add 3 % in a marina, and a path that is wrongly halved 17 to 33 %
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
-_GO_ON = 0.7  # share of scans that go on without a change of ranges: vehicles that strafe had .65 and less with one
 _FAULTS = 3  # at most, one after the other
 _FEWEST = 15  # nodes: fewer do not tell a change from noise, unless pairs of scans show when
 
@@ -133,18 +129,11 @@ def _other_ranges(found: MotionFindings) -> List[_Trial]:
     return [trial for trial in tried if trial.gain > 0.0]
 
 
-def goes_on_with_other_ranges(run: Solution, track: Track) -> bool:
-    """Return whether scans of a run of a vehicle that goes ahead go on once a change of its ranges is taken out.
-
-    False where scans are too few to tell.
-    """
+def with_other_ranges(run: Solution, track: Track) -> List[Tuple[SonarFault, Solution]]:
+    """Return changes of ranges that make a run likelier of a vehicle that goes ahead, each with the run without it."""
     fit = fit_of(run)
     trials = _other_ranges(MotionFindings(replace(run, state=fit.state), fit, track))
-    best = max(trials, key=_gain, default=None)
-    if best is None or best.gain < _NATS_ALONE:
-        return False
-    shares = shares_heard_before(replace(best.run, state=best.fit.state), 0)
-    return scans_go_on(run.log.node_times[1:], shares, _GO_ON).answer is Answer.FINE
+    return [(trial.fault, replace(trial.run, state=trial.fit.state)) for trial in trials]
 
 
 def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:
