@@ -19,6 +19,7 @@ class FaultRow:
     """A kind of fault. text: its name, with {} where the size stands. make: of fault_makers or rare_faults.
 
     named: a regular expression of causes that are right to name; empty where none is looked for.
+    named_alone: of further ones that are right where a compass tells the motion alone, and positions nothing.
     keyword, size: the argument of `make` that a seed draws. is_factor: whether the size is a factor, drawn as its
     logarithm is. begins: whether the fault has a moment to begin at. others: further arguments.
     """
@@ -31,6 +32,11 @@ class FaultRow:
     is_factor: bool = False
     begins: bool = False
     others: Mapping[str, object] = field(default_factory=dict)
+    named_alone: str = ""
+
+    def right_causes(self, alone: bool) -> str:
+        """Return a regular expression of causes that are right to name; alone: a compass tells the motion alone."""
+        return f"{self.named}|{self.named_alone}" if alone and self.named_alone else self.named
 
     def drawn(self, seconds: float, rng: Optional[np.random.RandomState]) -> Tuple[str, Fault]:
         """Return name and fault for a recording of so many seconds; drawn at random with `rng`, else as usual."""
@@ -134,7 +140,8 @@ ROWS = (
     FaultRow("compass sticks", rare.compass_sticks, "compass stuck", begins=True),
     FaultRow("compass trembles by {} deg", rare.compass_noisy, "compass trembles", "degrees", 5.0),
     FaultRow("compass {} deg off, positions right", rare.compass_off, _MOVES, "degrees", 60.0),
-    FaultRow("compass reversed, positions right", rare.compass_reversed, _REVERSED, others={"positions_follow": False}),
+    FaultRow("compass reversed, positions right", rare.compass_reversed, _REVERSED, others={"positions_follow": False},
+             named_alone=_OVER),
     FaultRow("compass reversed", rare.compass_reversed, f"{_REVERSED}|{_OVER}", others={"positions_follow": True}),
     FaultRow("mount tilted {} deg", rare.mount_tilted, "is tilted", "degrees", 20.0),
     FaultRow("head loses {} deg each minute", rare.head_loses_steps, f"{_SLIPPED}|{_DRIFTS}", "degrees", 3.0),

@@ -143,7 +143,8 @@ def main() -> None:
         for fault, (row, make) in faults(recording.seconds, arguments.seed).items():
             if wanted.search(f"{name}: {fault}"):
                 whole = whole or mapped_as(recording, "--refine")
-                counts[print_row(f"{name}: {fault}", make(recording), whole, row.named, arguments.truth)] += 1
+                named = row.right_causes(name.endswith(_COMPASS))
+                counts[print_row(f"{name}: {fault}", make(recording), whole, named, arguments.truth)] += 1
     print(", ".join(f"{counts[judged]} {judged.value}" for judged in Judged))
 
 
