@@ -19,6 +19,7 @@ _LONG = 1.2  # m: how far echoes of a wall reach along a beam, an echo's length 
 _FEWEST = 6  # times that the head looks into a sector: walls may happen to be as far in fewer
 _MOVES = np.array([10.0, np.pi / 2.0])  # m or rad: of a vehicle that goes less all walls may go along
 _LEAVES = np.array([5.0, np.pi / 2.0])  # m towards it, or rad: a vehicle that goes or turns less may follow a wall
+_END, _AT_ENDS = 0.1, 0.5  # share of its beams, where the vehicle is farthest to a side, and of these that hear it
 _LEFT = 0.5  # m: by which what is hidden behind it may matter
 
 
@@ -32,8 +33,10 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     goes_along = _heard_always(beams, sectors)
     if goes_along is None:
         return list(beams), []
-    towards = [one for one, sector in zip(beams, sectors) if goes_along[sector].any()]
-    if _may_be_wall(goes_along) and (_width(track, towards) < _LEAVES).all():
+    pointing = goes_along.any(axis=1)[sectors]
+    heard = np.array([goes_along[sector, _loud(one)].any() for one, sector in zip(beams, sectors)])[pointing]
+    towards = [one for one, points in zip(beams, pointing) if points]
+    if _may_be_wall(goes_along) and not _is_heard_everywhere(track, towards, heard):
         return list(beams), []
     near = _in_range(goes_along | _in_next_sectors(goes_along))
     metres, width = _CELL * (0.5 + np.nonzero(goes_along)[1].min()), goes_along.any(axis=1).sum() * 360 // _SECTORS
@@ -49,16 +52,18 @@ def _may_be_wall(goes_along: np.ndarray) -> bool:
     return bool((goes_along.sum(axis=0) * _SECTOR <= widest).all())
 
 
-def _width(track: Track, beams: Sequence[PlacedBeam]) -> np.ndarray:
-    """Return within which width [m] a vehicle stays most of the time where `beams` point, and within which turn [rad].
+def _is_heard_everywhere(track: Track, beams: Sequence[PlacedBeam], heard: np.ndarray) -> bool:
+    """Return whether the vehicle goes towards it or turns, and beams that point to it hear it (n,) at the ends of that.
 
-    A vehicle that follows a wall hears it at one range all the way.
+    A vehicle that follows a wall hears it at one range all the way, and no longer where it leaves it.
     """
     angles, poses = np.array([one.beam.angle for one in beams]), np.stack([one.T_target_sonar for one in beams])
     towards = beam_directions(angles, poses)[:, :2].mean(axis=0)
-    values = np.sort(np.column_stack([track.poses[:, :2] @ towards, np.unwrap(track.poses[:, 2])]), axis=0)
-    most = int(_MOSTLY * (len(values) - 1))
-    return (values[most:] - values[: len(values) - most]).min(axis=0)
+    moves = track.at(np.array([one.beam.stamp_ns for one in beams]) * 1e-9)
+    values = np.column_stack([moves[:, :2] @ towards, np.unwrap(moves[:, 2])])
+    in_order, few = heard[np.argsort(values, axis=0)], max(int(_END * len(beams)), 1)
+    ends = np.array([in_order[:few].mean(axis=0), in_order[-few:].mean(axis=0)])
+    return bool((np.ptp(values, axis=0) >= _LEAVES).any() and (ends > _AT_ENDS).all())
 
 
 def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[np.ndarray]:
@@ -67,8 +72,7 @@ def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[
     loud, looked = np.zeros((_SECTORS, count)), np.bincount(sectors, minlength=_SECTORS)
     entered = np.bincount(sectors[np.diff(sectors, prepend=-1) != 0], minlength=_SECTORS) >= _FEWEST
     for one, sector in zip(beams, sectors):
-        strengths = one.beam.intensities
-        loud[sector, np.unique(_cells(one)[strengths > strengths.max(initial=0) / 2])] += 1.0
+        loud[sector, _loud(one)] += 1.0
     always = (loud > _MOSTLY * looked[:, np.newaxis]) & entered[:, np.newaxis]
     widest = _WIDEST * np.count_nonzero(entered)
     always[:, (always.sum(axis=0) > widest) | (_share(loud, looked, ~always) > _ELSEWHERE)] = False
@@ -92,6 +96,12 @@ def _in_range(cells: np.ndarray) -> np.ndarray:
     wide[:, 1:] |= cells[:, :-1]
     wide[:, :-1] |= cells[:, 1:]
     return wide
+
+
+def _loud(placed: PlacedBeam) -> np.ndarray:
+    """Return the numbers of the cells that are more than half as loud as the loudest."""
+    strengths = placed.beam.intensities
+    return np.unique(_cells(placed)[strengths > strengths.max(initial=0) / 2])
 
 
 def _cells(placed: PlacedBeam) -> np.ndarray:

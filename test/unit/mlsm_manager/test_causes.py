@@ -72,12 +72,12 @@ def _turning(beams):
 
 @pytest.mark.parametrize("leaves", [0.0, 20.0])
 def test_a_wall_that_the_vehicle_follows_does_not_go_along(leaves):
-    """In the last 18 % of the time it goes `leaves` m away."""
+    """In the last 18 % of the time it goes `leaves` m away, and hears anything."""
     angles = np.radians(np.arange(0.0, 3600.0, 3.0))
-    ranges = 4.0 / np.maximum(np.sin(angles), 0.01)
-    beams = _beams(angles, ranges)
-    times = np.arange(float(len(beams)))
+    times = np.arange(float(len(angles)))
     aside = leaves * np.maximum(times / times[-1] - 0.82, 0.0) / 0.18
+    anything = np.random.RandomState(1).uniform(2.0, 25.0, len(angles))
+    beams = _beams(angles, np.where(aside > 0.0, anything, 4.0 / np.maximum(np.sin(angles), 0.01)))
     straight = Track(times, np.column_stack([0.1 * times, aside, 0.0 * times]))
     assert without_companions(beams, straight) == (beams, [])
 
