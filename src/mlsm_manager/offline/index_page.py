@@ -7,16 +7,16 @@ from string import Template
 from typing import Any, Dict, List, NamedTuple, Sequence
 
 from mlsm_manager.offline.run_files import PICTURE, REPORT
-from mlsm_manager.self_check.verdict import Standing
+from mlsm_manager.self_check.verdict import RunAnswer
 from node_support.errors import counted
 from node_support.files import package_folder
 
 _NO_MAP = "no map"
 _COLORS = {
-    Standing.FINE.value: "#2e7d32",
-    Standing.PARTLY.value: "#5c6bc0",
-    Standing.UNMEASURED.value: "#757575",
-    Standing.DOUBTFUL.value: "#c77700",
+    RunAnswer.FINE.value: "#2e7d32",
+    RunAnswer.PARTLY.value: "#5c6bc0",
+    RunAnswer.UNMEASURED.value: "#757575",
+    RunAnswer.DOUBTFUL.value: "#c77700",
     _NO_MAP: "#b3261e",
 }
 
@@ -36,14 +36,14 @@ class Outcome(NamedTuple):
     problem: str
 
     @property
-    def standing(self) -> str:
+    def answer(self) -> str:
         """How it came out, in words."""
-        return self.summary.get("standing", Standing.UNMEASURED.value) if self.summary else _NO_MAP
+        return self.summary.get("answer", RunAnswer.UNMEASURED.value) if self.summary else _NO_MAP
 
 
 def index_page(outcomes: Sequence[Outcome], total: int) -> str:
     """Return the page of those of `total` recordings that are done."""
-    found = Counter(outcome.standing for outcome in outcomes)
+    found = Counter(outcome.answer for outcome in outcomes)
     counts = " &nbsp; ".join(f"{found[one]} {_badge(one)}" for one in _COLORS if found[one])
     title = f"{sum(bool(one.summary) for one in outcomes)} of {total} recordings mapped"
     waiting = f" &nbsp; {total - len(outcomes)} waiting" if len(outcomes) < total else ""
@@ -51,8 +51,8 @@ def index_page(outcomes: Sequence[Outcome], total: int) -> str:
     return page.substitute(title=title, counts=counts + waiting, rows="".join(map(_row, outcomes)))
 
 
-def _badge(standing: str) -> str:
-    return f'<b style="background:{_COLORS[standing]}">{standing}</b>'
+def _badge(answer: str) -> str:
+    return f'<b style="background:{_COLORS[answer]}">{answer}</b>'
 
 
 def _row(outcome: Outcome) -> str:
@@ -64,7 +64,7 @@ def _row(outcome: Outcome) -> str:
         picture = f'<a href="{link}/{page}">{shown}</a><small><a href="{link}/">files</a></small>'
     name, place = html.escape(outcome.job.recording.name), html.escape(str(outcome.job.recording.parent))
     told = "".join(f"<p>{html.escape(line)}</p>" for line in _lines(outcome))
-    return f"<tr><td>{picture}</td><td><p>{_badge(outcome.standing)} {name}</p>{told}<small>{place}</small></td></tr>\n"
+    return f"<tr><td>{picture}</td><td><p>{_badge(outcome.answer)} {name}</p>{told}<small>{place}</small></td></tr>\n"
 
 
 def _lines(outcome: Outcome) -> List[str]:

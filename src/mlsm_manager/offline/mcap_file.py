@@ -6,7 +6,7 @@ from typing import Any, List
 import numpy as np
 
 from mlsm_manager.report.mission import Mission, Path
-from mlsm_manager.self_check.verdict import Answer, Standing
+from mlsm_manager.self_check.verdict import Answer, RunAnswer
 from mlsm_manager.surface_map.export.rasters import occupancy
 from node_support.files import whole_file
 from recordings.bags.messages import Placing, write_pose
@@ -16,7 +16,9 @@ _MAP, _VEHICLE = "map", "base_link"
 _FLOAT32 = 7  # of PointField
 _OK, _WARN, _STALE = 0, 1, 3  # of DiagnosticStatus
 _LEVELS = {Answer.FINE: _OK, Answer.DOUBTFUL: _WARN, Answer.NOT_MEASURED: _STALE}
-_LEVELS_OF_RUNS = {Standing.FINE: _OK, Standing.PARTLY: _STALE, Standing.UNMEASURED: _STALE, Standing.DOUBTFUL: _WARN}
+_LEVELS_OF_RUNS = {
+    RunAnswer.FINE: _OK, RunAnswer.PARTLY: _STALE, RunAnswer.UNMEASURED: _STALE, RunAnswer.DOUBTFUL: _WARN,
+}  # fmt: skip
 
 
 def write_mcap(file: File, mission: Mission, picture: File) -> None:
@@ -80,7 +82,7 @@ def _path(bag: McapWriter, stamp_ns: int, path: Path) -> Any:
 
 def _checks(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
     message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
-    message.status.append(_status(bag, "trust", _LEVELS_OF_RUNS[mission.standing], mission.headline))
+    message.status.append(_status(bag, "trust", _LEVELS_OF_RUNS[mission.answer], mission.headline))
     for verdict in mission.verdicts:
         message.status.append(_status(bag, verdict.name, _LEVELS[verdict.answer], verdict.line()))
     return message

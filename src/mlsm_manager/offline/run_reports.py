@@ -15,7 +15,7 @@ from mlsm_manager.offline.run_files import MCAP, REFINED, REPORT, positions_at, 
 from mlsm_manager.offline.trust import WITHIN
 from mlsm_manager.report.mission import Mission, ScanRecord
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.verdict import Standing
+from mlsm_manager.self_check.verdict import RunAnswer
 from node_support.errors import counted
 from node_support.geometry import move_of, transformed
 
@@ -94,7 +94,7 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
         errors=errors,
         further=run.further,
         origin=run.stored.origin,
-        standing=Standing.UNMEASURED if findings is None else findings.trust.standing,
+        answer=RunAnswer.UNMEASURED if findings is None else findings.trust.answer,
     )
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.path_checks import per_minute
-from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer, Standing, Verdict, too_few
+from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer, RunAnswer, Verdict, too_few
 
 WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
 
@@ -44,28 +44,28 @@ class Trust:
         return replace(held, covariances=if_not, if_so=float(self.deviations.max()))
 
     @property
-    def standing(self) -> Standing:
+    def answer(self) -> RunAnswer:
         """How the run came out; what is mended is wrong no more."""
         answers = {verdict.answer for verdict in self.verdicts}
         if Answer.DOUBTFUL in answers or any(not cause.is_mended for cause in self.causes):
-            return Standing.DOUBTFUL
+            return RunAnswer.DOUBTFUL
         if Answer.FINE not in answers or too_few(self.matched):
-            return Standing.UNMEASURED
-        return Standing.FINE if answers == {Answer.FINE} else Standing.PARTLY
+            return RunAnswer.UNMEASURED
+        return RunAnswer.FINE if answers == {Answer.FINE} else RunAnswer.PARTLY
 
     @property
     def line(self) -> str:
         begin = float(self.times[0])
         fine, doubtful, missing = ([one for one in self.verdicts if one.answer is answer] for answer in Answer)
         mended = "".join(f"; mended: {cause.line(begin)}" for cause in self.causes if cause.is_mended)
-        if self.standing is Standing.DOUBTFUL:
+        if self.answer is RunAnswer.DOUBTFUL:
             wrong = [cause.line(begin) for cause in self.causes if not cause.is_mended]
             said = "; ".join([*wrong, *(one.text for one in doubtful)])
             known = f"at best {self._known}" if self._is_told else _NOTHING
             return f"trust: DOUBTFUL: {said}{mended}; {known}"
-        if self.standing is Standing.UNMEASURED:
+        if self.answer is RunAnswer.UNMEASURED:
             return f"trust: NOT MEASURED: {self._not_measured}{mended}"
-        if self.standing is Standing.PARTLY:
+        if self.answer is RunAnswer.PARTLY:
             names = ", ".join(one.name for one in missing)
             told = f"{len(fine)} of {len(self.verdicts)} checks are fine, NOT MEASURED: {names}"
             return f"trust: {told}; {self._known} if these are fine too{mended}"
@@ -130,7 +130,7 @@ class Trust:
         stated = [round(float(value), 2) if known else None for value, known in zip(minutes, told)]
         causes = [cause.to_mapping(float(self.times[0])) for cause in self.causes]
         return {
-            "standing": self.standing.value, "causes": causes, "checks": checks, "deviation_per_minute": stated,
+            "answer": self.answer.value, "causes": causes, "checks": checks, "deviation_per_minute": stated,
         }  # fmt: skip
 
 

@@ -6,7 +6,7 @@ from typing import Any, Dict, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 
 from georeferencing.origin import Origin
-from mlsm_manager.self_check.verdict import Standing, Verdict
+from mlsm_manager.self_check.verdict import RunAnswer, Verdict
 from mlsm_manager.surface_map.blocks import Blocks
 
 _ELLIPSE_DEVIATIONS = 2.0
@@ -78,7 +78,7 @@ class Mission:
     one the best. scans: oldest first, at least one. verdicts: of all checks; none where none was made.
     calibration: name -> (value, deviation). facts: name -> value, for the head of the page. parameters: name -> value.
     further: ways of further recordings, which are shown in the map only. origin: where the map lies, if that is known.
-    standing: how it came out.
+    answer: how it came out.
     """
 
     title: str
@@ -94,7 +94,7 @@ class Mission:
     errors: Dict[str, Dict[str, float]] = field(default_factory=dict)
     further: Sequence[Path] = ()
     origin: Optional[Origin] = None
-    standing: Standing = Standing.UNMEASURED
+    answer: RunAnswer = RunAnswer.UNMEASURED
 
     @property
     def best(self) -> Path:

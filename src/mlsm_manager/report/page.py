@@ -22,7 +22,7 @@ from mlsm_manager.report.figures import (
     sensor_health,
 )
 from mlsm_manager.report.mission import Mission
-from mlsm_manager.self_check.verdict import Answer, Standing, Verdict
+from mlsm_manager.self_check.verdict import Answer, RunAnswer, Verdict
 from node_support.files import package_folder, write_whole
 
 _NEAR = 0.75  # share of a limit from which on a figure is worth a look
@@ -93,7 +93,7 @@ def report_page(mission: Mission) -> str:
     return page.substitute(
         title=escape(mission.title),
         plotly=get_plotlyjs(),
-        summary=f"{_lamp(light_of_run(mission.standing, lights))} {escape(mission.headline)}",
+        summary=f"{_lamp(light_of_run(mission.answer, lights))} {escape(mission.headline)}",
         facts=_table(("", ""), _words(mission.facts)),
         checks=_table(_CHECK_HEAD, checks, "checks") if checks else "<p>No checks were made.</p>",
         errors=_errors(mission),
@@ -162,10 +162,10 @@ def light_of(verdict: Verdict) -> Light:
     return Light.AMBER if worse > _NEAR else Light.GREEN
 
 
-def light_of_run(standing: Standing, lights: List[Light]) -> Light:
+def light_of_run(answer: RunAnswer, lights: List[Light]) -> Light:
     """Return the light of the whole run; where all checks are fine that of the worst of their `lights`."""
-    if standing is not Standing.FINE:
-        return Light.RED if standing is Standing.DOUBTFUL else Light.GREY
+    if answer is not RunAnswer.FINE:
+        return Light.RED if answer is RunAnswer.DOUBTFUL else Light.GREY
     return Light.AMBER if Light.AMBER in lights else Light.GREEN
 
 

@@ -28,7 +28,7 @@ class Answer(Enum):
     NOT_MEASURED = "not measured"
 
 
-class Standing(Enum):
+class RunAnswer(Enum):
     """How a run came out by all its checks."""
 
     FINE = "all checks fine"

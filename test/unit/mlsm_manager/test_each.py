@@ -9,7 +9,7 @@ from programs import ROOT
 
 from mlsm_manager.offline.each import INDEX, Cluster, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.index_page import Job, Outcome
-from mlsm_manager.self_check.verdict import Standing
+from mlsm_manager.self_check.verdict import RunAnswer
 from recordings.bags.bag import RecordingError
 
 
@@ -72,16 +72,16 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
 
 
 @pytest.mark.parametrize(
-    ("summary", "standing"),
+    ("summary", "answer"),
     [
         ({}, "no map"),
         ({"scans": 4}, "not measured"),  # nothing was checked
-        *(({"standing": one.value}, one.value) for one in Standing),
+        *(({"answer": one.value}, one.value) for one in RunAnswer),
     ],
 )
-def test_the_page_says_of_each_recording_what_its_own_summary_says(summary, standing):
+def test_the_page_says_of_each_recording_what_its_own_summary_says(summary, answer):
     outcome = Outcome(Job(Path("a.bag"), Path("a")), summary, "")
-    assert outcome.standing == standing
+    assert outcome.answer == answer
 
 
 def test_a_cluster_that_is_not_there_is_told_before_the_first_map(tmp_path, monkeypatch):

@@ -17,7 +17,7 @@ from heading_only import reduce_bag
 from map_bag_runs import refused, run, summary_of
 from programs import BASIN, ROOT
 
-from mlsm_manager.self_check.verdict import Standing
+from mlsm_manager.self_check.verdict import RunAnswer
 from mlsm_manager.surface_map.map_file import Layer, read_map
 from recordings.bags.bag import Bag
 
@@ -212,8 +212,8 @@ def test_an_mcap_file_holds_the_mission_in_messages_that_bring_their_types(twice
         covariances = [message.pose.covariance[[0, 7]] for _, message in bag.messages("/pose")]
         assert np.all(np.array(covariances) > 0.0)
         (checks,) = [message for _, message in bag.messages("/checks")]
-        is_ok, standing = checks.status[0].level == 0, Standing(summary_of(twice)["standing"])
-        assert is_ok == (standing is Standing.FINE)
+        is_ok, answer = checks.status[0].level == 0, RunAnswer(summary_of(twice)["answer"])
+        assert is_ok == (answer is RunAnswer.FINE)
 
 
 def test_the_report_shows_the_way_of_each_recording(twice):

@@ -13,7 +13,7 @@ from hypothesis.extra.numpy import arrays
 from made_missions import mission, verdict
 
 from mlsm_manager.report.page import Light, light_of, light_of_run, slider_json
-from mlsm_manager.self_check.verdict import Standing
+from mlsm_manager.self_check.verdict import RunAnswer
 
 MOST_BYTES = 15e6
 
@@ -31,15 +31,15 @@ def test_a_check_near_its_limit_is_amber_and_beyond_it_red(value, limit, more_is
 
 
 @pytest.mark.parametrize(
-    ("standing", "light"),
+    ("answer", "light"),
     [
-        (Standing.FINE, Light.AMBER), (Standing.PARTLY, Light.GREY), (Standing.UNMEASURED, Light.GREY),
-        (Standing.DOUBTFUL, Light.RED),
+        (RunAnswer.FINE, Light.AMBER), (RunAnswer.PARTLY, Light.GREY), (RunAnswer.UNMEASURED, Light.GREY),
+        (RunAnswer.DOUBTFUL, Light.RED),
     ],
 )  # fmt: skip
-def test_the_light_of_a_run_says_what_its_headline_says(standing, light):
-    assert light_of_run(standing, [Light.GREEN, Light.AMBER]) is light
-    assert light_of_run(Standing.FINE, [Light.GREEN]) is Light.GREEN
+def test_the_light_of_a_run_says_what_its_headline_says(answer, light):
+    assert light_of_run(answer, [Light.GREEN, Light.AMBER]) is light
+    assert light_of_run(RunAnswer.FINE, [Light.GREEN]) is Light.GREEN
 
 
 def test_the_slider_begins_with_the_first_scan_and_counts_from_the_start_of_the_run():

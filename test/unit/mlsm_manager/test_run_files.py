@@ -20,7 +20,7 @@ from mlsm_manager.offline.run_files import Run, errors_of, position_error, write
 from mlsm_manager.offline.trust import KnownPlaces, Trust
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Assumption, Cause
-from mlsm_manager.self_check.verdict import Answer, Standing, Verdict
+from mlsm_manager.self_check.verdict import Answer, RunAnswer, Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, matrices
@@ -138,20 +138,20 @@ def test_the_headline_says_fine_only_of_what_was_measured(verdicts, matched, lin
 
 
 @pytest.mark.parametrize(
-    ("verdicts", "matched", "standing"),
+    ("verdicts", "matched", "answer"),
     [
-        ((), 7, Standing.UNMEASURED),
-        ((FINE, FINE), 6, Standing.UNMEASURED),
-        ((FINE, FINE), 7, Standing.FINE),
-        ((FINE, SHORT), 7, Standing.PARTLY),
-        ((SHORT, FIRING), 0, Standing.DOUBTFUL),
+        ((), 7, RunAnswer.UNMEASURED),
+        ((FINE, FINE), 6, RunAnswer.UNMEASURED),
+        ((FINE, FINE), 7, RunAnswer.FINE),
+        ((FINE, SHORT), 7, RunAnswer.PARTLY),
+        ((SHORT, FIRING), 0, RunAnswer.DOUBTFUL),
     ],
 )
-def test_a_run_is_fine_only_if_all_was_measured_and_what_was_wrong_is_mended(verdicts, matched, standing):
+def test_a_run_is_fine_only_if_all_was_measured_and_what_was_wrong_is_mended(verdicts, matched, answer):
     trust = trust_of(*verdicts, matched=matched)
     mended = Cause("the odometry stepped", 9.0, 5.0, is_mended=True)
-    assert trust.standing is replace(trust, causes=[mended]).standing is standing
-    assert replace(trust, causes=[replace(mended, is_mended=False)]).standing is Standing.DOUBTFUL
+    assert trust.answer is replace(trust, causes=[mended]).answer is answer
+    assert replace(trust, causes=[replace(mended, is_mended=False)]).answer is RunAnswer.DOUBTFUL
 
 
 def test_no_check_is_fine_of_a_path_that_was_only_assumed():
