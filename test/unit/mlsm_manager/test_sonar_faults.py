@@ -92,7 +92,7 @@ def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, 
 @pytest.mark.long
 def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
     short_at_first = broken.range_told(source("harbour compass", 400.0), 0.0, 0.385, 300.0)
-    assert mapped_as(short_at_first, "--refine").findings.trust.causes == []
+    assert mapped_as(short_at_first, "--refine", *NAMED).findings.trust.causes == []
 
 
 @pytest.mark.long
