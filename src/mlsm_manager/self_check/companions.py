@@ -53,9 +53,10 @@ def _may_be_wall(goes_along: np.ndarray) -> bool:
 
 
 def _is_heard_everywhere(track: Track, beams: Sequence[PlacedBeam], heard: np.ndarray) -> bool:
-    """Return whether the vehicle goes towards it or turns, and beams that point to it hear it (n,) at the ends of that.
+    """Return whether the vehicle moves away or turns, and still hears it at both ends of its way and of its turns.
 
-    A vehicle that follows a wall hears it at one range all the way, and no longer where it leaves it.
+    beams: that point to it. heard: (n,) whether they hear it. A vehicle that follows a wall hears it at one range all
+    the way, and no longer where it leaves it.
     """
     angles, poses = np.array([one.beam.angle for one in beams]), np.stack([one.T_target_sonar for one in beams])
     towards = beam_directions(angles, poses)[:, :2].mean(axis=0)
