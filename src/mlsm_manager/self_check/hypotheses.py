@@ -8,6 +8,7 @@ from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.joint_solver.surface_points import LEAST_REACH, surface_normals
 from mlsm_manager.odometry.faults import Mirror
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.compiled_distances import along_x, mean_distance
@@ -21,6 +22,7 @@ _FAR = 4.0  # m: echoes that are farther from all others say no more than that s
 _NOISE = 0.2  # m: by less no two scans of one place lie closer, and nothing follows from that
 _MOST_TOLD = 20.0  # independent distances in a scan, however alike the pairs are
 _LATE = np.arange(-1.0, 3.0)  # s: delays that a head may have with nothing wrong
+_NOTHING = 1e-9  # keeps an average of nothing defined
 _SCALES = np.arange(0.6, 1.65, 0.1)  # of distances that thrusters report
 
 
@@ -156,6 +158,19 @@ class ScanPairs:
             moves = velocities * (self._heard[other].times.mean() - self._heard[one].times.mean())
             table[:, column] = [_apart(earlier, later + move) for move in moves]
         return table
+
+    def facing(self, numbers: Iterable[int], base: Hypothesis) -> np.ndarray:
+        """Return how the surfaces that some scans heard face: (2, 2), the mean outer product of their normals, by how
+        certain these are, where the scans are if `base` is right.
+        """
+        normals, qualities = [], []
+        for number in numbers:
+            places = self._placed(number, base)
+            each, certain = surface_normals(places, np.full(len(places), LEAST_REACH))
+            normals.append(each)
+            qualities.append(certain)
+        normals, qualities = np.concatenate(normals), np.concatenate(qualities)
+        return np.einsum("n,na,nb->ab", qualities, normals, normals) / max(qualities.sum(), _NOTHING)
 
     def in_odometry(self, velocity: np.ndarray, time: float, base: Hypothesis) -> np.ndarray:
         """Return a velocity (2,) of `carried` in odom."""
