@@ -126,27 +126,38 @@ def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, BatchResult
     After a change of ranges it begins where the odometry leads, or, where that tells no distances, with a path that is
     as much longer: the path that they made may be far from the true one.
     """
-    log, nodes = fault.logged(run.log), run.state.nodes
-    if fault.kind is SonarKind.RANGES:
-        alone = np.isinf(run.parameters.odometry.distance_deviation)
-        nodes = _longer(run, log, nodes, fault) if alone else reckoned(run, log, nodes, (fault.begin, np.inf))
-    changed = replace(run, log=log, state=State(nodes.copy(), run.state.run.copy()))
-    return changed, fit_of(changed)
+    log = fault.logged(run.log)
+    fits = []
+    for nodes in _starts(run, log, fault):
+        changed = replace(run, log=log, state=State(nodes, run.state.run.copy()))
+        fits.append((changed, fit_of(changed)))
+    return max(fits, key=lambda one: one[1].log_likelihood)
 
 
-def _longer(run: Solution, log: RunLog, nodes: np.ndarray, fault: SonarFault) -> np.ndarray:
-    """Return the nodes with all ways and speeds after a change of ranges as much longer as the true ranges are.
+def _starts(run: Solution, log: RunLog, fault: SonarFault) -> List[np.ndarray]:
+    """Return nodes (n, width) at which a fit without a fault may begin."""
+    if fault.kind is not SonarKind.RANGES:
+        return [run.state.nodes.copy()]
+    if not np.isinf(run.parameters.odometry.distance_deviation):
+        return [reckoned(run, log, run.state.nodes, (fault.begin, np.inf))]
+    before = int(np.searchsorted(log.node_times, fault.begin)) - 1
+    # The scan that the change came in may have pulled the node before it along.
+    return [_longer(run, log, fault, first) for first in sorted({max(before, 0), max(before - 1, 0)})]
 
-    About the change itself, where no scan lay on those before it, the vehicle goes on as before.
+
+def _longer(run: Solution, log: RunLog, fault: SonarFault, first: int) -> np.ndarray:
+    """Return the nodes with all ways and speeds after node `first` as much longer as the true ranges are.
+
+    In the next scans, which did not lie on those before them, the vehicle goes on as before.
     """
-    result, factor = nodes.copy(), np.exp(fault.sizes[0])
-    first = max(int(np.searchsorted(log.node_times, fault.begin)) - 1, 0)
+    nodes, factor = run.state.nodes, np.exp(fault.sizes[0])
+    result = nodes.copy()
     places = log.node_poses(np.arange(len(nodes)))[:, :YAW] + nodes[:, :YAW]
     result[first:, :YAW] += (factor - 1.0) * (places[first:] - places[first])
     result[first:, AHEAD : TRAVEL + 1] *= factor
     result[first : first + _PASSES, AHEAD : TRAVEL + 1] = nodes[max(first - 1, 0), AHEAD : TRAVEL + 1]
-    last = log.node_times[min(first + _PASSES, len(nodes) - 1)]
-    return reckoned(run, log, result, (fault.begin, last))
+    begin, last = min(first + 1, len(nodes) - 1), min(first + _PASSES, len(nodes) - 1)
+    return reckoned(run, log, result, (log.node_times[begin], log.node_times[last]))
 
 
 def likelihood_across(run: Solution, fit: BatchResult, fault: SonarFault) -> float:

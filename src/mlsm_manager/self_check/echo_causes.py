@@ -8,7 +8,7 @@ from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.odometry.faults import FaultKind, Mirror, MotionFault, with_headings_reversed, with_positions_turned
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
-from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Cause, ranked
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Cause, Fault, ranked
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
@@ -40,7 +40,7 @@ class EchoFindings(NamedTuple):
 
     causes: List[Cause]
     mount: Hypothesis
-    suspected: Sequence[MotionFault] = ()
+    suspected: Sequence[Fault] = ()
 
 
 def echo_findings(
@@ -54,7 +54,7 @@ def echo_findings(
     if not pairs.tell:
         return EchoFindings([], AS_TOLD)
     if not any(scan.track.reports_positions for scan in scans):
-        return EchoFindings([], AS_TOLD, _suspected_slip(pairs) if pairs.honest.as_solved else ())
+        return EchoFindings([], AS_TOLD, _suspected_changes(pairs) if pairs.honest.as_solved else ())
     honest = pairs.honest
     best, nats = _turned(pairs, pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)]))
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
@@ -185,11 +185,15 @@ def _changed(pairs: ScanPairs) -> List[Cause]:
     return ranked(found)[:1]
 
 
-def _suspected_slip(pairs: ScanPairs) -> List[MotionFault]:
-    """Return the likeliest slip of the head as the vehicle went by the solver, whose path gave way to it."""
-    found = [one for one in _likely_changes(pairs, _SLIPS, pairs.honest) if one.change.turn]
-    best = max(found, key=lambda one: one.nats, default=None)
-    return [] if best is None else [MotionFault(FaultKind.SLIP, best.begin, (best.change.turn,))]
+def _suspected_changes(pairs: ScanPairs) -> List[Fault]:
+    """Return the likeliest slip of the head, and the likeliest changes of its range setting to more and to less, as the
+    vehicle went by the solver, whose path gave way to them.
+    """
+    slips = [one for one in _likely_changes(pairs, _SLIPS, pairs.honest) if one.change.turn]
+    ranges = _likely_changes(pairs, _RANGES, pairs.honest)
+    farther, nearer = ([one for one in ranges if (one.change.ranges > 1.0) is more] for more in (True, False))
+    kinds = (sorted(kind, key=lambda one: -one.nats)[:1] for kind in (slips, farther, nearer))
+    return [_fault_of(one.change, one.begin) for kind in kinds for one in kind]
 
 
 def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis) -> List[_Changed]:
@@ -212,8 +216,11 @@ def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesi
 
 def _of_change(change: Change, begin: float, nats: float, usual: float) -> Cause:
     """Return the cause for a change of the head or of its setting; usual: m, range of echoes."""
+    fault, metres = _fault_of(change, begin), abs(1.0 - change.ranges) * usual
+    return Cause(fault.text, nats, begin, turn=abs(change.turn), metres=metres, fault=fault)
+
+
+def _fault_of(change: Change, begin: float) -> Fault:
     if change.ranges == 1.0:
-        fault = MotionFault(FaultKind.SLIP, begin, (change.turn,))
-        return Cause(fault.text, nats, begin, turn=abs(change.turn), fault=fault)
-    fault = SonarFault(SonarKind.RANGES, begin, (float(np.log(change.ranges)),))
-    return Cause(fault.text, nats, begin, metres=abs(1.0 - change.ranges) * usual, fault=fault)
+        return MotionFault(FaultKind.SLIP, begin, (change.turn,))
+    return SonarFault(SonarKind.RANGES, begin, (float(np.log(change.ranges)),))

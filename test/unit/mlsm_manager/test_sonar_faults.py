@@ -90,6 +90,14 @@ def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, 
 
 
 @pytest.mark.long
+def test_a_change_of_ranges_is_named_beside_a_compass_where_the_vehicle_passes_near_walls_too():
+    passing = shortened(source("harbour compass", 300.0), 200.0, 100.0)
+    (cause,) = mapped_as(broken.range_changed(passing, 111.0, 1.37), "--refine", *NAMED).findings.trust.causes
+    assert cause.text == "the range setting changed untold: reported ranges are 0.73 times the true ones"
+    assert cause.begin == pytest.approx(passing.track.times[0] + 111.0, abs=10.0)
+
+
+@pytest.mark.long
 def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
     short_at_first = broken.range_told(source("harbour compass", 400.0), 0.0, 0.385, 300.0)
     assert mapped_as(short_at_first, "--refine", *NAMED).findings.trust.causes == []
