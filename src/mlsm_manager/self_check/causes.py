@@ -65,6 +65,11 @@ class Cause:
         return self.text if np.isnan(self.begin) else f"{self.text} at {moment(max(self.begin, run_begin), run_begin)}"
 
 
+def is_alike(one: Cause, other: Cause) -> bool:
+    """Return whether two causes are of one kind, or both such as no fit mends."""
+    return (one.fault and one.fault.kind) is (other.fault and other.fault.kind)
+
+
 class Assumption(NamedTuple):
     """What nobody measured and the path rests on. text: one clause; empty where there is none.
 

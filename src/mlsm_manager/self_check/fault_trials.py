@@ -26,9 +26,12 @@ from mlsm_manager.self_check.motion_findings import MotionFindings
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
-_NATS = 5.0  # by which a run must fit better without a fault; by usual errors of a compass a marina's gains 10
+_NATS_SONAR = 5.0  # by which a run must fit better without a fault of the sonar; without one of the odometry:
+# NAMED_FROM. Wrong changes of distances, where half of the circle was heard, gained 6.4, wrong steps in a marina 6.
 _NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
-_NATS_CIRCLE = 20.0  # of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22
+# Of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22. Beside a DVL parts of an
+# unbroken marina gain up to 10 by errors of 4 deg, where 10 deg gain as much; in simulated harbours 5 deg gain 80.
+_NATS_CIRCLE, _LARGE_CIRCLE = 20.0, np.radians(5.0)
 _SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
 _SIZED = (FaultKind.CARRIED, FaultKind.RIGHT)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
@@ -84,16 +87,12 @@ def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Sus
 
 
 def _needed(found: MotionFindings, fault: Fault) -> float:
-    """Return by how many nats a run must be likelier without a fault for that to be named.
-
-    Distances may change at any moment, and currents begin: where half of the circle was heard, a wrong change gained
-    6.4.
-    """
-    if found.is_alone and fault.kind is FaultKind.CIRCLE:
+    """Return by how many nats a run must be likelier without a fault for that to be named."""
+    if fault.kind is FaultKind.CIRCLE and (found.is_alone or np.linalg.norm(fault.sizes) < _LARGE_CIRCLE):
         return _NATS_CIRCLE
     if found.is_alone and fault.kind in _SUDDEN:
         return _NATS_ALONE
-    return NAMED_FROM if fault.kind in (FaultKind.DISTANCES, FaultKind.CARRIED) else _NATS
+    return _NATS_SONAR if isinstance(fault, SonarFault) else NAMED_FROM
 
 
 def _errs(errors: OdometryErrors) -> bool:

@@ -12,7 +12,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
-from mlsm_manager.self_check.causes import Cause, Fault, Suspicion, of_steps, of_stuck, ranked, widened
+from mlsm_manager.self_check.causes import Cause, Fault, Suspicion, is_alike, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.course import NOT_TOLD, CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import without_faults
@@ -22,6 +22,8 @@ from node_support.geometry import composed, move_of
 
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
+_AT_ONCE = 10.0
+"""Nats from which on a single look is believed: each look asks again, and one in some hundred shows what is not."""
 _MOST_PLACES = 20000  # four days of scans of 16 s
 
 
@@ -40,6 +42,7 @@ class LiveCauses:
             self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
             self._is_new = False
             self._found: List[Cause] = []
+            self._shown: List[Cause] = []
             self._spread, self.by_mounts = np.zeros((2, 2)), 0.0
             self._course = NOT_TOLD
 
@@ -85,7 +88,12 @@ class LiveCauses:
                 self._course = course
 
     def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
-        """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after."""
+        """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after.
+
+        What little speaks for is named once two looks in a row show it.
+        """
+        self._shown, before = found, self._shown
+        found = [one for one in found if one.evidence > _AT_ONCE or any(is_alike(one, other) for other in before)]
         kinds = {cause.fault.kind for cause in found if cause.fault is not None}
         past = [cause for cause in self._found if cause.begin < begin and cause.fault is not None]
         self._found = [*found, *(cause for cause in past if cause.fault.kind not in kinds)]

@@ -198,6 +198,18 @@ def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
     assert [cause.text for cause in localiser.following.causes()] == ["compass stepped by 28 deg"]
 
 
+@pytest.mark.parametrize(("evidence", "looks"), [(10.0, 2), (100.0, 1)], ids=["weak", "strong"])
+def test_a_run_that_goes_on_names_what_little_speaks_for_once_two_looks_in_a_row_show_it(monkeypatch, evidence, looks):
+    shown = iter([[], [Cause("turned", evidence)], [], [Cause("turned", evidence)], [Cause("turned", evidence + 1.0)]])
+    monkeypatch.setattr("mlsm_manager.self_check.live_causes.standing_causes", lambda *_: next(shown))
+    live, named = LiveCauses(), []
+    for scan in scans_in(WHOLE)[:10]:
+        live.take(scan, scan.reference_pose)
+        live.look()
+        named.append(len(live.causes([])))
+    assert named[5:] == ([0, 0, 0, 0, 1] if looks == 2 else [0, 1, 0, 1, 1])
+
+
 def test_scans_that_are_not_matched_are_not_compared():
     localiser = LocaliserParameters().build_localiser()
     localiser.match(False)
