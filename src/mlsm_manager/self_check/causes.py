@@ -67,7 +67,8 @@ class Cause:
 
 def is_alike(one: Cause, other: Cause) -> bool:
     """Return whether two causes are of one kind, or both such as no fit mends."""
-    return (one.fault and one.fault.kind) is (other.fault and other.fault.kind)
+    kinds = [None if cause.fault is None else cause.fault.kind for cause in (one, other)]
+    return kinds[0] is kinds[1]
 
 
 class Assumption(NamedTuple):

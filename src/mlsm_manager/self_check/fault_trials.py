@@ -26,13 +26,16 @@ from mlsm_manager.self_check.motion_findings import MotionFindings
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
-_NATS_SONAR = 5.0  # by which a run must fit better without a fault of the sonar; without one of the odometry:
-# NAMED_FROM. Wrong changes of distances, where half of the circle was heard, gained 6.4, wrong steps in a marina 6.
-_NATS_ALONE = 15.0  # of what changes of a sonar beside a compass alone: when, how much and how fast it went are unknown
+# By which a run must fit better without a fault of the sonar. Without one of the odometry by NAMED_FROM: wrong changes
+# of distances, where half of the circle was heard, gained 6.4, and wrong steps of the compass in parts of a marina 6.
+_NATS_SONAR = 5.0
+# Beside a compass alone, without one of these: when, how much and how fast the vehicle went are unknown. By a tilt
+# parts of an unbroken marina gain 8, and a broken one 27.
+_NATS_ALONE = 15.0
+_VAGUE_ALONE = (SonarKind.RANGES, SonarKind.TILT, FaultKind.SLIP, FaultKind.STEP)
 # Of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22. Beside a DVL parts of an
 # unbroken marina gain up to 10 by errors of 4 deg, where 10 deg gain as much; in simulated harbours 5 deg gain 80.
 _NATS_CIRCLE, _LARGE_CIRCLE = 20.0, np.radians(5.0)
-_SUDDEN = (SonarKind.RANGES, FaultKind.SLIP)  # such changes
 _SIZED = (FaultKind.CARRIED, FaultKind.RIGHT)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
@@ -90,7 +93,7 @@ def _needed(found: MotionFindings, fault: Fault) -> float:
     """Return by how many nats a run must be likelier without a fault for that to be named."""
     if fault.kind is FaultKind.CIRCLE and (found.is_alone or np.linalg.norm(fault.sizes) < _LARGE_CIRCLE):
         return _NATS_CIRCLE
-    if found.is_alone and fault.kind in _SUDDEN:
+    if found.is_alone and fault.kind in _VAGUE_ALONE:
         return _NATS_ALONE
     return _NATS_SONAR if isinstance(fault, SonarFault) else NAMED_FROM
 
