@@ -141,7 +141,7 @@ def _starts(run: Solution, log: RunLog, fault: SonarFault) -> List[np.ndarray]:
     if not np.isinf(run.parameters.odometry.distance_deviation):
         return [reckoned(run, log, run.state.nodes, (fault.begin, np.inf))]
     before = int(np.searchsorted(log.node_times, fault.begin)) - 1
-    # The scan that the change came in may have pulled the node before it along.
+    # The first scan after the change may have moved the node before it: the fit begins from the one before that, too.
     return [_longer(run, log, fault, first) for first in sorted({max(before, 0), max(before - 1, 0)})]
 
 

@@ -18,7 +18,7 @@ _FINER = (0.05, 0.02)  # m/s
 _SCANS = 12  # of a stretch: a current that is there for longer the solver finds
 _FEWEST = 3  # pairs
 _LEAST = -5.0  # nats: unbroken recordings show -5.5 and less, and a bottom that was lost -4.6 and more
-_FACING = 0.3  # mean squared cosine: all around it is a half; of a marina's canal .05 to .25, of open water .4 to .7
+_FACING = 0.3  # mean squared cosine; .5 with surfaces all around. In a marina's canal .13 to .24, elsewhere .39 to .73
 _MOST = 3  # stretches: pairs tell how long one is worse than a fit does
 
 
@@ -45,7 +45,7 @@ def carried(pairs: ScanPairs, base: Hypothesis, farther: float = 0.0) -> List[Ca
 def _is_told(pairs: ScanPairs, found: _Stretch, base: Hypothesis) -> bool:
     """Return whether enough surfaces face along the velocity of a stretch to tell it.
 
-    Between the walls of a canal a vehicle that stands hears what one does that goes.
+    Between the walls of a canal a vehicle hears the same whether it moves or stands.
     """
     along = found.velocity / np.hypot(*found.velocity)
     share = along @ pairs.facing(range(found.first, found.last + 1), base) @ along

@@ -66,7 +66,7 @@ class Cause:
 
 
 def is_alike(one: Cause, other: Cause) -> bool:
-    """Return whether two causes are of one kind, or both such as no fit mends."""
+    """Return whether two causes have faults of one kind, or both have none."""
     kinds = [None if cause.fault is None else cause.fault.kind for cause in (one, other)]
     return kinds[0] is kinds[1]
 

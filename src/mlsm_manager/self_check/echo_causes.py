@@ -186,8 +186,9 @@ def _changed(pairs: ScanPairs) -> List[Cause]:
 
 
 def _suspected_changes(pairs: ScanPairs) -> List[Fault]:
-    """Return the likeliest slip of the head, and the likeliest changes of its range setting to more and to less, as the
-    vehicle went by the solver, whose path gave way to them.
+    """Return the likeliest slip of the head, the likeliest longer range setting and the likeliest shorter one.
+
+    Scans are compared along the solver's path, which such a change may have bent.
     """
     slips = [one for one in _likely_changes(pairs, _SLIPS, pairs.honest) if one.change.turn]
     ranges = _likely_changes(pairs, _RANGES, pairs.honest)

@@ -26,15 +26,15 @@ from mlsm_manager.self_check.motion_findings import MotionFindings
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
 # scale, and its mean. Beyond, faults are tried.
 _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
-# By which a run must fit better without a fault of the sonar. Without one of the odometry by NAMED_FROM: wrong changes
-# of distances, where half of the circle was heard, gained 6.4, and wrong steps of the compass in parts of a marina 6.
+# Nats by which a run must fit better without a fault of the sonar. For one of the odometry it is NAMED_FROM: wrong
+# changes of distances, where half of the circle was heard, gained 6.4, wrong steps of the compass in a marina 6.
 _NATS_SONAR = 5.0
-# Beside a compass alone, without one of these: when, how much and how fast the vehicle went are unknown. By a tilt
-# parts of an unbroken marina gain 8, and a broken one 27.
+# The same for these faults beside a compass alone, as nothing reports speeds there. Parts of an unbroken marina gain 8
+# by a wrong tilt, a tilted one 27.
 _NATS_ALONE = 15.0
 _VAGUE_ALONE = (SonarKind.RANGES, SonarKind.TILT, FaultKind.SLIP, FaultKind.STEP)
-# Of a compass alone that errs by the heading: a canal's unbroken one gains 16, broken ones 22. Beside a DVL parts of an
-# unbroken marina gain up to 10 by errors of 4 deg, where 10 deg gain as much; in simulated harbours 5 deg gain 80.
+# The same for a compass that errs by the heading, where it is alone or errs by less than 5 deg. Alone, an unbroken one
+# gains 16 in a canal and broken ones 22. Beside a DVL 4 deg gain up to 10 in an unbroken marina, 5 deg 80 in a harbour.
 _NATS_CIRCLE, _LARGE_CIRCLE = 20.0, np.radians(5.0)
 _SIZED = (FaultKind.CARRIED, FaultKind.RIGHT)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part

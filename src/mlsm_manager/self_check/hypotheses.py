@@ -160,8 +160,9 @@ class ScanPairs:
         return table
 
     def facing(self, numbers: Iterable[int], base: Hypothesis) -> np.ndarray:
-        """Return how the surfaces that some scans heard face: (2, 2), the mean outer product of their normals, by how
-        certain these are, where the scans are if `base` is right.
+        """Return the mean outer product (2, 2) of the normals of surfaces that some scans heard if `base` is right.
+
+        Each normal is weighted by how certain it is.
         """
         normals, qualities = [], []
         for number in numbers:

@@ -23,7 +23,8 @@ from node_support.geometry import composed, move_of
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
 _AT_ONCE = 10.0
-"""Nats from which on a single look is believed: each look asks again, and one in some hundred shows what is not."""
+"""Nats from which on one look is enough. Weaker causes must be found by two in a row: each scan is another chance for a
+wrong one."""
 _MOST_PLACES = 20000  # four days of scans of 16 s
 
 
@@ -90,7 +91,7 @@ class LiveCauses:
     def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
         """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after.
 
-        What little speaks for is named once two looks in a row show it.
+        A weak cause is named after two looks in a row have found it.
         """
         self._shown, before = found, self._shown
         found = [one for one in found if one.evidence > _AT_ONCE or any(is_alike(one, other) for other in before)]

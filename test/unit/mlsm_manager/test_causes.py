@@ -199,7 +199,7 @@ def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
 
 
 @pytest.mark.parametrize(("evidence", "looks"), [(10.0, 2), (100.0, 1)], ids=["weak", "strong"])
-def test_a_run_that_goes_on_names_what_little_speaks_for_once_two_looks_in_a_row_show_it(monkeypatch, evidence, looks):
+def test_a_run_that_goes_on_names_a_weak_cause_after_two_looks_in_a_row_have_found_it(monkeypatch, evidence, looks):
     shown = iter([[], [Cause("turned", evidence)], [], [Cause("turned", evidence)], [Cause("turned", evidence + 1.0)]])
     monkeypatch.setattr("mlsm_manager.self_check.live_causes.standing_causes", lambda *_: next(shown))
     live, named = LiveCauses(), []
