@@ -120,7 +120,8 @@ class LiveSolver:
     def solution(self) -> Solution:
         """The run as it is known now, until the next scan."""
         term = self.estimates[-1].prior_term if self.estimates else None
-        return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
+        known = self._known
+        return Solution(self.log, self.parameters, self.state, self.submaps, known, term, self.fixes, known is None)
 
     @property
     def told(self) -> Optional[Gaussian]:

@@ -67,6 +67,7 @@ class LiveCauses:
             if not self._is_new or len(self._scans) < _FEWEST:
                 return
             self._is_new, scans, places = False, list(self._scans), self._places
+            begin = np.array(places[0][1:])
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
         track = joined([scan.track for scan in scans])
         of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
@@ -79,7 +80,8 @@ class LiveCauses:
             # What a stuck compass missed is not tried: the path is not mended live.
             shown = [cause.fault for cause in found if cause.fault is not None]
             shown = [fault for fault in shown if fault.kind is not FaultKind.STUCK]
-            motion = _motion_of(run, [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])], course)
+            suspected = [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])]
+            motion = _motion_of(run, suspected, track.with_poses(path), begin, course)
             found, by_mounts, course = motion.told_with(of_echoes, of_beams), motion.by_mounts, motion.course
             spread = motion.spread(run.log.node_times[-1:])[0]
         found += [of_stuck(*one) for one in stuck_headings(track)]
@@ -122,8 +124,16 @@ def _not_followed(steps: Sequence[Step], begin: float) -> List[MotionFault]:
     return [MotionFault(FaultKind.RIGHT, step.time, (step.turn,)) for step in turned]
 
 
-def _motion_of(run: Solution, suspected: Sequence[Fault], before: CourseFound) -> MotionFindings:
-    """Return what speaks against odometry and sonar of a run, and what its course says of the mount, or said before."""
+def _motion_of(
+    run: Solution, suspected: Sequence[Fault], mapped: Track, begin: np.ndarray, before: CourseFound
+) -> MotionFindings:  # fmt: skip
+    """Return what speaks against odometry and sonar of a run, and what its course says of the mount, or said `before`.
+
+    mapped: T_map_base of these scans. begin: (2,) m in map, from where the vehicle was followed.
+    """
     track = run.log.odometry.track_from(-np.inf)
     motion = without_faults(run, fit_of(run), track, Suspicion(suspected))
-    return motion.with_newest_course(track.with_poses(motion.run.path(track.times)), before)
+    solved, first = track.with_poses(motion.run.path(track.times)), run.log.node_times[:1]
+    # A part of a run is solved about its own first place.
+    apart = (solved.at(first) - mapped.at(first))[0, :2]
+    return motion.with_newest_course(solved, begin + apart, before)

@@ -28,7 +28,7 @@ class MotionFindings:
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
     nodes. course: how the sonar is turned by the vehicle's usual one. mounts: rad, by how much it may be where none
-    tells it.
+    tells it; by_mounts: m, how far it may so turn the newest place about where the map begins.
     """
 
     run: Solution
@@ -38,6 +38,7 @@ class MotionFindings:
     apart: List[np.ndarray] = field(default_factory=list)
     course: CourseFound = NOT_TOLD
     mounts: float = 0.0
+    by_mounts: float = 0.0
 
     @property
     def is_alone(self) -> bool:
@@ -62,36 +63,37 @@ class MotionFindings:
             added += np.einsum("na,nb->nab", beside, beside)
         return added
 
-    @property
-    def by_mounts(self) -> float:
-        """How far [m] the newest place may be turned about the run's first one by what nothing tells of the mounts."""
-        return float(self.mounts * np.hypot(*(self.places[-1] - self.places[0])))
-
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings of a whole run with what its path T_map_base says of the sonar's mount."""
-        return self._with(self._course_of(path), True) if self.is_told else self
+        return self._with(self._course_of(path), self.places[0], True) if self.is_told else self
 
-    def with_newest_course(self, path: Track, before: CourseFound) -> "MotionFindings":
-        """Return the findings of the newest scans likewise; before: what older ones told of the mount.
+    def with_newest_course(self, path: Track, begin: np.ndarray, before: CourseFound) -> "MotionFindings":
+        """Return the findings of the newest scans likewise.
 
-        A short run that is asked for its place in the map turns with the sonar, and hides nothing.
+        begin: (2,) m, where these would put the place from which the vehicle was followed. before: what older scans
+        told of the mount. A run that was found in a map turns with the sonar, and hides nothing before a course is
+        told.
         """
         if not self.is_told:
             return self
         course = self._course_of(path).after(before)
-        return self._with(course, course != NOT_TOLD)
+        return self._with(course, begin, course != NOT_TOLD or self.run.begins_map)
 
-    def _with(self, course: CourseFound, may_hide: bool) -> "MotionFindings":
-        """may_hide: whether the odometry hides some of the sonar's turn, where no course tells which is turned."""
+    def _with(self, course: CourseFound, begin: np.ndarray, may_hide: bool) -> "MotionFindings":
+        """begin: (2,) m, about which a turn of the sonar turns the places.
+
+        may_hide: whether the odometry hides some of that turn, where no course tells which is turned.
+        """
         places, direction = self.places, NOT_TOLD if course.is_told else self._direction
         turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
         if mounts and may_hide:
             turn = mounts = direction.hidden
-        gone = places - places[0]
+        gone = places - begin
         aside = rotated(gone, np.full(len(gone), turn)) - gone
         causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
-        return replace(self, causes=causes, apart=apart, course=course, mounts=mounts)
+        by_mounts = mounts * float(np.hypot(*gone[-1]))
+        return replace(self, causes=causes, apart=apart, course=course, mounts=mounts, by_mounts=by_mounts)
 
     def _course_of(self, path: Track) -> CourseFound:
         if self.is_alone:  # nothing else tells a turn of the sonar, however large it is

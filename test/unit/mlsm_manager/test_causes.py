@@ -34,6 +34,12 @@ def found_in(recording):
     return echo_findings(scans_in(recording), recording.sonar_in_base)
 
 
+def follow_first_scans_of_a_turned_sonar(localiser):
+    for scan in scans_in(broken.mount_turned(WHOLE, 14.0))[:9]:
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+
+
 def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on():
     noise = np.radians(5.0) * np.random.RandomState(1).normal(size=len(WHOLE.track.times))
     scan, following = scans_in(broken.with_compass_error(WHOLE, noise, False))[2], Following(LIMITS, 1.0, monotonic)
@@ -187,6 +193,14 @@ def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows(reco
     localiser.look_for_causes()
     assert localiser.following.causes()[0].text.startswith(said)
     assert np.trace(localiser.following.found.covariance([])) > 0.05
+
+
+def test_a_turned_sonar_turns_the_map_that_the_run_begins_and_none_in_which_it_is_found():
+    first, found_in_map = (LocaliserParameters().build_localiser(WHOLE.sonar_in_base) for _ in range(2))
+    follow_first_scans_of_a_turned_sonar(first)
+    found_in_map.restore(first.stored("map", {}, 0.0, ""), False)
+    follow_first_scans_of_a_turned_sonar(found_in_map)
+    assert first.following.found.by_mounts > 2.0 * found_in_map.following.found.by_mounts > 0.0
 
 
 def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
