@@ -42,7 +42,8 @@ def recordings(seeds: List[int]) -> Dict[str, Callable[[], Recording]]:
             for what, errors in _ERRORS.items()
             for tour in _TOURS
         },
-        **{f"{tour}, compass alone": partial(_without_positions, tour) for tour in _TOURS},
+        **{f"{tour}, compass alone": partial(_without_positions, partial(_drawn, tour, 1, {})) for tour in _TOURS},
+        f"{WHOLE_MARINA}, compass alone": partial(_without_positions, partial(_read, recorded(WHOLE_MARINA))),
     }
 
 
@@ -54,8 +55,8 @@ def _drawn(tour: str, seed: int, errors: Dict[str, float]) -> Recording:
     return simulated(f"{tour}_tour").with_dvl(seed, **errors)
 
 
-def _without_positions(tour: str) -> Recording:
-    return compass_alone(_drawn(tour, 1, {}))
+def _without_positions(made: Callable[[], Recording]) -> Recording:
+    return compass_alone(made())
 
 
 def live_causes(recording: Recording, kind: OdometryKind) -> Set[str]:
