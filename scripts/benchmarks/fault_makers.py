@@ -21,7 +21,7 @@ _LOUDEST = 127  # the sonars' own largest strength
 
 def with_odometry(recording: Recording, poses: np.ndarray) -> Recording:
     """Return a recording of which the odometry said `poses` (m, 3)."""
-    return recording.with_track(Track(recording.track.times, poses))
+    return recording.with_track(recording.track.with_poses(poses))
 
 
 def after(recording: Recording, at: float) -> np.ndarray:
@@ -82,8 +82,7 @@ def odometry_missing(recording: Recording, at: float, seconds: float) -> Recordi
     """Leave out the odometry of some seconds, and with it the beams that cannot be placed then."""
     start, track = recording.track.times[0] + at, recording.track
     kept = (track.times < start) | (track.times > start + seconds)
-    stamps = np.array([placed.beam.stamp_ns for placed in recording.beams]) * 1e-9
-    known = (stamps < start) | (stamps > start + seconds)
+    known = (recording.times < start) | (recording.times > start + seconds)
     beams = [placed for placed, one in zip(recording.beams, known) if one]
     return replace(recording, track=Track(track.times[kept], track.poses[kept]), beams=beams)
 
@@ -147,8 +146,7 @@ def mount_upside_down(recording: Recording) -> Recording:
 
 def mount_shifted(recording: Recording, metres: float) -> Recording:
     """Let the sonar sit ahead of where tf says, along the vehicle."""
-    stamps = np.array([one.beam.stamp_ns for one in recording.beams]) * 1e-9
-    told = matrices(recording.track.at(stamps))[:, :3, 0] * metres
+    told = matrices(recording.track.at(recording.times))[:, :3, 0] * metres
     beams = []
     for placed, move in zip(recording.beams, told):
         place = placed.T_target_sonar.copy()
@@ -187,8 +185,7 @@ def head_stops(recording: Recording, at: float, seconds: float, tells: bool = Tr
     """Let the head stand: it hears one direction; its reported angle stands too (`tells`) or goes on."""
     start = recording.track.times[0] + at
     angles = np.array([one.beam.angle for one in recording.beams])
-    stamps = np.array([one.beam.stamp_ns for one in recording.beams]) * 1e-9
-    stands = angles[np.searchsorted(stamps, start)]
+    stands = angles[np.searchsorted(recording.times, start)]
     same = np.flatnonzero(np.abs(np.angle(np.exp(1j * (angles - stands)))) < 0.05)
 
     def stood(beam: Beam, number: int) -> Beam:
@@ -291,7 +288,7 @@ def _spiked(beam: Beam, place: Optional[int]) -> Beam:
 
 def delayed(recording: Recording, seconds: float, growing: bool = False, at: float = 0.0) -> Recording:
     """Let stamps be later than the pings by some seconds, from a moment on; growing: from 0 at the start to these."""
-    since = np.array([one.beam.stamp_ns for one in recording.beams]) * 1e-9 - recording.track.times[0]
+    since = recording.times - recording.track.times[0]
     return stamped(recording, seconds * (since / recording.seconds if growing else since >= at))
 
 

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks.fault_rows import faults
-from benchmarks.harness import WHOLE_MARINA, benchmark_parser, compass_alone, mapped_as, marina, recorded
+from benchmarks.harness import WHOLE_MARINA, benchmark_parser, mapped_as, marina, recorded
 from benchmarks.tours import simulated
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording, read_recording, track_between
@@ -40,7 +40,7 @@ SOURCES = [name + form for form in ("", _COMPASS) for name in ("marina", "canal"
 def source(name: str, seconds: float) -> Recording:
     """Return the beginning of an unbroken recording; of the canal the end, which is beyond the marina's first part."""
     if name.endswith(_COMPASS):
-        return compass_alone(source(name[: -len(_COMPASS)], seconds))
+        return source(name[: -len(_COMPASS)], seconds).without_positions()
     if name == "marina":
         return shortened(marina(), seconds)
     if name == "canal":

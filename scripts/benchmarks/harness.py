@@ -43,12 +43,6 @@ def marina(**asked: str) -> Recording:
     return read_recording(recorded(MARINA), Request(**asked))
 
 
-def compass_alone(recording: Recording) -> Recording:
-    """Return a recording of which the odometry tells nothing but the heading."""
-    track = recording.track
-    return recording.with_track(Track(track.times, track.poses * [0.0, 0.0, 1.0]))
-
-
 def placed(beams: List[Beam], odometry: Track, T_base_sonar: np.ndarray) -> List[PlacedBeam]:
     """Return beams of a vehicle on its way where its odometry puts a sonar at T_base_sonar (4, 4)."""
     places = matrices(odometry.at(np.array([beam.stamp_ns for beam in beams]) * 1e-9)) @ T_base_sonar

@@ -12,7 +12,7 @@ from typing import Callable, Dict, List, Set
 import numpy as np
 
 from benchmarks.faults import shortened
-from benchmarks.harness import MARINA, WHOLE_MARINA, benchmark_parser, compass_alone, mapped_as, recorded
+from benchmarks.harness import MARINA, WHOLE_MARINA, benchmark_parser, mapped_as, recorded
 from benchmarks.live_faults import told_by
 from benchmarks.tours import simulated
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
@@ -56,7 +56,7 @@ def _drawn(tour: str, seed: int, errors: Dict[str, float]) -> Recording:
 
 
 def _without_positions(made: Callable[[], Recording]) -> Recording:
-    return compass_alone(made())
+    return made().without_positions()
 
 
 def live_causes(recording: Recording, kind: OdometryKind) -> Set[str]:

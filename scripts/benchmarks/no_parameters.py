@@ -14,7 +14,7 @@ from typing import Callable, Dict, Iterator, List, NamedTuple, Sequence, Tuple
 import numpy as np
 from thesis_results.moves import moves_figures
 
-from benchmarks.harness import benchmark_parser, compass_alone, mapped_as, marina
+from benchmarks.harness import benchmark_parser, mapped_as, marina
 from benchmarks.paths import PathFigures, judged
 from benchmarks.scans import KINDS, SonarKind
 from benchmarks.tours import simulated
@@ -87,7 +87,7 @@ def _scaled_rows() -> Iterator[Tuple[str, Row]]:
 def _marina(factors: np.ndarray, _seed: int) -> Recording:
     """Return the recording with an odometry that reports so many times (3,) its poses."""
     recording = marina(truth="/ground_truth")
-    return recording.with_track(Track(recording.track.times, recording.track.poses * factors))
+    return recording.with_track(recording.track.with_poses(recording.track.poses * factors))
 
 
 def _scaled(tour: str, error: float, seed: int) -> Recording:
@@ -116,7 +116,7 @@ def _head(world: str, kind: SonarKind, seed: int) -> Recording:
 
 
 def _compass(tour: str, seed: int) -> Recording:
-    return compass_alone(simulated(f"{tour}_tour").with_dvl(seed, direction=0.0))
+    return simulated(f"{tour}_tour").with_dvl(seed, direction=0.0).without_positions()
 
 
 def _twin(name: str, _seed: int) -> Recording:

@@ -97,7 +97,7 @@ def head_trembles(recording: Recording, degrees: float, seed: int = 1) -> Record
 def stamps_jitter(recording: Recording, seconds: float, seed: int = 1) -> Recording:
     """Let each stamp be wrong by itself; beams keep their order."""
     track, rng = recording.track, np.random.RandomState(seed)
-    true = np.array([one.beam.stamp_ns for one in recording.beams]) * 1e-9
+    true = recording.times
     told = np.sort(np.clip(true + seconds * rng.normal(size=len(true)), track.times[0], track.times[-1]))
     return stamped(recording, told - true)
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from benchmarks import harness
 from benchmarks.fault_makers import beams_stop, deaf, odometry_missing
-from benchmarks.harness import benchmark_parser, compass_alone
+from benchmarks.harness import benchmark_parser
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
 from benchmarks.twin_conditions import TwinParameters, reported
@@ -101,7 +101,7 @@ def marina(kind: OdometryKind) -> Tuple[str, Recording, Track]:
     recording = harness.marina()
     whole = replayed(recording, OdometryKind.DVL)
     if kind is OdometryKind.HEADING:
-        recording = compass_alone(recording)
+        recording = recording.without_positions()
     return "marina", recording, Track(whole.times, whole.corrected)
 
 

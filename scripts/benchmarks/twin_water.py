@@ -190,7 +190,7 @@ def twin_of(source: Recording, parameters: TwinParameters) -> Recording:
     path = true_path(source.track, parameters)
     water = made_water(path.poses[:, :2], parameters, rng)
     odometry = reported(path, parameters, rng)
-    stamps = np.array([placed.beam.stamp_ns for placed in source.beams]) * 1e-9
+    stamps = source.times
     inside = (stamps > path.times[0] + _AT_ENDS) & (stamps < path.times[-1] - _AT_ENDS)
     beams = [placed.beam for placed, kept in zip(source.beams, inside) if kept]
     stamps = stamps[inside]

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benchmarks.fault_makers import range_told
 from benchmarks.faults import ending
-from benchmarks.harness import compass_alone, mapped_as
+from benchmarks.harness import mapped_as
 
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -59,5 +59,5 @@ def test_positions_are_believed_in_a_canal_though_scans_of_a_shorter_path_lie_on
 
 
 def test_a_canal_shows_no_iron_beside_a_compass_alone_that_errs_as_usual(canal):
-    found = mapped_as(compass_alone(canal), "--refine", "--odometry", "heading")
+    found = mapped_as(canal.without_positions(), "--refine", "--odometry", "heading")
     assert found.findings.trust.causes == []

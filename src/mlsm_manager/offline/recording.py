@@ -58,7 +58,7 @@ class Recording:
         """
         if correction == BeamCorrection():
             return self
-        times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
+        times = self.times
         later = times + correction.sonar_delay
         reached = (later >= self.track.times[0]) & (later <= self.track.times[-1])
         moves = matrices(move_of(self.track.at(times), self.track.at(later)))
@@ -71,8 +71,7 @@ class Recording:
 
     def with_track(self, track: Track) -> "Recording":
         """Return the recording with another T_odom_base, which the beams follow."""
-        times = np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
-        moves = matrices(move_of(self.track.at(times), track.at(times)))
+        moves = matrices(move_of(self.track.at(self.times), track.at(self.times)))
         return replace(self._moved(moves), track=track)
 
     def _moved(self, moves: np.ndarray) -> "Recording":
@@ -96,11 +95,16 @@ class Recording:
         """Return the recording with the sonar turned by `turn` [rad] in base_link where it is, and the other way round
         where `is_over`.
         """
-        poses = self.track.at(np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9)
+        poses = self.track.at(self.times)
         about = np.append(self.sonar_in_base, turn)
         over = np.diag([1.0, -1.0, -1.0, 1.0]) if is_over else np.eye(4)
         move = matrices(about[np.newaxis])[0] @ over @ matrices(inverse(np.append(about[:2], 0.0))[np.newaxis])[0]
         return self._moved(matrices(poses) @ move @ matrices(inverse(poses)))
+
+    @property
+    def times(self) -> np.ndarray:
+        """(n,) s, when the beams left."""
+        return np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
 
     @property
     def sonar_in_base(self) -> np.ndarray:

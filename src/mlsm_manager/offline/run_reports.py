@@ -143,7 +143,7 @@ def _accuracy(mapped: MappedBag) -> str:
 
 
 def _scan_records(mapped: MappedBag) -> List[ScanRecord]:
-    stamps = np.array([placed.beam.stamp_ns for placed in mapped.recording.beams]) * 1e-9
+    stamps = mapped.recording.times
     pace = float(np.median(np.diff(stamps))) if len(stamps) > 1 else np.inf
     records, before = [], 0
     for update in mapped.replayed.updates:

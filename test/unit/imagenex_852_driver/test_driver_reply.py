@@ -60,11 +60,6 @@ def replies_in(parser, chunks):
     return [parsed.reply for chunk in chunks for parsed in parser.feed(chunk)]
 
 
-@given(st.binary(max_size=2000), st.lists(st.integers(0), max_size=5))
-def test_no_stream_of_bytes_makes_it_raise(data, cuts):
-    replies_in(ReplyParser(), chunks_of(data, cuts))
-
-
 @given(garbage(), replies())
 def test_a_whole_reply_behind_garbage_is_never_lost(noise, reply):
     assert replies_in(ReplyParser(), [noise + reply.encode()])[-1:] == [reply]

@@ -7,8 +7,8 @@ import re
 import pytest
 import yaml
 from document import LIVE_NODES
+from launch_files import launched
 from programs import ROOT
-from test_live_parameters import launched
 
 from mlsm_manager.migrate_yaml import KEYS, NODES, TABLE, migrated, migrated_text
 from node_support.help import HOSTS

@@ -9,9 +9,8 @@ import pytest
 import yaml
 from hypothesis import given
 from hypothesis import strategies as st
+from launch_files import launched
 from programs import ROOT
-from roslaunch.config import ROSLaunchConfig
-from roslaunch.xmlloader import XmlLoader
 
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import MapInput, MlsmCoreParameters
@@ -127,13 +126,6 @@ def test_what_only_the_live_node_knows_is_left_out():
 def test_what_a_node_would_refuse_is_refused_by_its_name(group):
     with pytest.raises(ParameterError, match="sonar_to_cloud"):
         replay_values({"sonar_to_cloud": group})
-
-
-def launched(launch, *arguments):
-    """Return the parameters that a launch file would set."""
-    config = ROSLaunchConfig()
-    XmlLoader().load(str(ROOT / "launch" / launch), config, argv=list(arguments), verbose=False)
-    return {name: parameter.value for name, parameter in config.params.items()}
 
 
 LAUNCHES = [

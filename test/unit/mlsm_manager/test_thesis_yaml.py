@@ -3,8 +3,8 @@
 import pytest
 import yaml
 from document import LIVE_NODES
+from launch_files import launched
 from programs import ROOT
-from test_live_parameters import launched
 
 from mlsm_manager.offline.map_bag import map_bag, map_bag_arguments
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values

@@ -69,9 +69,10 @@ def echoes_at(angles, **parameters):
     return [reader.read(ECHO, sonar_echo_of(angle)) for angle in angles]
 
 
+@pytest.mark.parametrize("intensities", [bytes([1, 2, 255]), [1, 2, 255]])
 @pytest.mark.parametrize("name", [OWN, "avora_msgs/SonarScanLine"])
-def test_our_own_message_is_taken_as_it_is(name):
-    found = beam(name, scan_line_of())
+def test_our_own_message_is_taken_as_it_is(name, intensities):
+    found = beam(name, scan_line_of(intensities=intensities))
     assert (found.stamp_ns, found.frame_id, found.angle, found.sensor_angle) == (STAMP_NS, "sonar", 0.5, -0.125)
     assert (found.intensities.tolist(), found.range_resolution) == ([1, 2, 255], 0.25)
 

@@ -4,29 +4,20 @@ from typing import List
 
 import numpy as np
 import pytest
+from virtual_line import VirtualTime
 
 from sonar_processing.beams.beam import Beam
 from sonar_processing.beams.beam_queue import NEWER_BEAMS, PATIENCE, BeamQueue
 
 
-class Clock:
-    """Wall time that only the test moves on."""
-
-    def __init__(self) -> None:
-        self.now = 0.0
-
-    def __call__(self) -> float:
-        return self.now
+@pytest.fixture
+def clock() -> VirtualTime:
+    return VirtualTime()
 
 
 @pytest.fixture
-def clock() -> Clock:
-    return Clock()
-
-
-@pytest.fixture
-def queue(clock: Clock) -> BeamQueue:
-    return BeamQueue(clock)
+def queue(clock: VirtualTime) -> BeamQueue:
+    return BeamQueue(clock.elapsed)
 
 
 def beam(number: int, frame: str = "sonar") -> Beam:
@@ -68,7 +59,7 @@ def test_a_beam_does_not_leave_because_one_of_another_frame_can_be_placed(queue:
     assert queue.frames() == {"left": 2}
 
 
-def test_no_beam_is_lost_while_a_process_stands_still_for_two_seconds(queue: BeamQueue, clock: Clock) -> None:
+def test_no_beam_is_lost_while_a_process_stands_still_for_two_seconds(queue: BeamQueue, clock: VirtualTime) -> None:
     fill(queue, range(NEWER_BEAMS))
     clock.now += 2.0
     assert fill(queue, range(NEWER_BEAMS, 5 * NEWER_BEAMS)) == []
@@ -76,7 +67,7 @@ def test_no_beam_is_lost_while_a_process_stands_still_for_two_seconds(queue: Bea
     assert len(popped(queue, 0, 1000)) == 5 * NEWER_BEAMS
 
 
-def test_what_cannot_be_placed_leaves_after_a_while_but_for_a_revolution(queue: BeamQueue, clock: Clock) -> None:
+def test_what_cannot_be_placed_leaves_after_a_while_but_for_a_revolution(queue: BeamQueue, clock: VirtualTime) -> None:
     fill(queue, range(NEWER_BEAMS + 30))
     assert queue.pop(unknown) == []
     clock.now += PATIENCE + 0.1
@@ -84,14 +75,14 @@ def test_what_cannot_be_placed_leaves_after_a_while_but_for_a_revolution(queue: 
     assert len(queue) == NEWER_BEAMS
 
 
-def test_a_slow_head_may_wait_longer(queue: BeamQueue, clock: Clock) -> None:
+def test_a_slow_head_may_wait_longer(queue: BeamQueue, clock: VirtualTime) -> None:
     for number in range(NEWER_BEAMS):
         fill(queue, range(number, number + 1))
         clock.now += 1.0
     assert queue.pop(unknown) == []
 
 
-def test_beams_that_can_be_placed_wait_for_whoever_is_busy(queue: BeamQueue, clock: Clock) -> None:
+def test_beams_that_can_be_placed_wait_for_whoever_is_busy(queue: BeamQueue, clock: VirtualTime) -> None:
     fill(queue, range(NEWER_BEAMS))
     clock.now += 3.0 * PATIENCE
     assert fill(queue, range(NEWER_BEAMS, 2 * NEWER_BEAMS)) == []
@@ -104,7 +95,7 @@ def test_a_flood_of_beams_takes_no_more_than_its_memory(queue: BeamQueue) -> Non
     assert len(queue) <= 10 * NEWER_BEAMS
 
 
-def test_messages_of_many_beams_get_room_for_two(queue: BeamQueue, clock: Clock) -> None:
+def test_messages_of_many_beams_get_room_for_two(queue: BeamQueue, clock: VirtualTime) -> None:
     queue.make_room(1000)
     fill(queue, range(2000))
     clock.now += PATIENCE + 0.1

@@ -13,13 +13,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as numpy_st
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
-from sonar_messages import scan_line_of
 from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix, quaternion_of
 from node_support.ros.transforms import matrix_from_message
-from sonar_processing.beams.reader import BeamMessageParameters, BeamReader
 from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import (
     StampedIntensityCloudArrays,
@@ -39,14 +37,6 @@ pytestmark = pytest.mark.filterwarnings("ignore:tostring:DeprecationWarning")
 HOUR = 3600.0
 STAMP_NS = 1_400_000_000 * SECOND + 123456789
 ANY_BITS = numpy_st.arrays(np.uint32, st.tuples(st.integers(0, 20), st.just(4))).map(lambda bits: bits.view(np.float32))
-
-
-def _line(**values):
-    return SonarScanLine(**{**vars(scan_line_of()), "header": header(STAMP_NS, "sonar"), **values})
-
-
-def _beam(message):
-    return BeamReader(BeamMessageParameters()).read(SonarScanLine._type, message).beams[0]
 
 
 def _sent(message, received_type):
@@ -77,17 +67,6 @@ def test_the_stamped_cloud_is_wire_compatible_with_the_thesis():
 @given(st.integers(0, 2**32 * SECOND - 1))
 def test_a_header_holds_every_stamp_exactly(stamp_ns):
     assert header(stamp_ns, "sonar").stamp.to_nsec() == stamp_ns
-
-
-def test_a_beam_has_what_its_message_says():
-    beam = _beam(_sent(_line(), SonarScanLine))
-    assert (beam.stamp_ns, beam.frame_id, beam.angle) == (STAMP_NS, "sonar", 0.5)
-    assert (beam.range_resolution, beam.sensor_angle) == (0.25, -0.125)
-    assert beam.intensities.tolist() == [1, 2, 255]
-
-
-def test_a_beam_can_be_made_of_a_list_of_intensities():
-    assert _beam(_line(intensities=[1, 2, 255])).intensities.tolist() == [1, 2, 255]
 
 
 @given(ANY_BITS, st.data())

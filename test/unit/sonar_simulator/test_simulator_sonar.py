@@ -19,7 +19,6 @@ from sonar_simulator.world.world_file import load_sdf
 
 PATTERN = BeamPattern(math.radians(22.0), math.radians(2.5), 50, 10)
 HEAD = SonarHead(120, 16.0)
-TURN = np.array([HEAD.angle(beam) for beam in range(120)])
 BASIN_FILE = ROOT / "worlds" / "basin.sdf"
 BASIN = load_sdf(BASIN_FILE).world
 WALLS = World.from_shapes("walls", [shape for shape in BASIN.shapes if "wall" in shape.name])
@@ -27,10 +26,6 @@ WALLS = World.from_shapes("walls", [shape for shape in BASIN.shapes if "wall" in
 
 def _sonar(world, seed=0, pattern=PATTERN, **values):
     return Sonar(RayCaster(world), pattern, make_echo_model("laser_cone", values), np.random.default_rng(seed))
-
-
-def _repeated(pose, count=120):
-    return np.repeat(pose[np.newaxis], count, axis=0)
 
 
 def test_rays_stay_inside_the_opening():
