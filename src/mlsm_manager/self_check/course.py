@@ -15,7 +15,9 @@ _STRAFES, _MOSTLY = np.radians(30.0), 0.9  # so many stretches are less far asid
 _VAGUE = np.radians(5.0)  # deviation of the mean course: sonar and DVL are mounted by eye to 6 deg; a marina's: 4.8 deg
 _CLEAR = 10.0  # deviations: so large a turn is told however vague it is
 _ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
-_NAMED = 2.0  # deviations
+_AGREES = 2.0  # deviations from which on a course may be the odometry's
+NAMED, NAMED_LIVE = 2.0, 3.0
+"""Deviations from which on a turn is named: live each scan asks anew, and 7 +- 3 deg were named in a marina."""
 _FAR = 3.0  # deviations: what goes farther aside counts as far
 LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes back
 
@@ -113,11 +115,12 @@ def odometry_agrees(found: CourseFound, reported: Track) -> bool:
     Then the vehicle strafes: that sonar and DVL are both turned by the same angle is less likely.
     """
     turn = course_of(reported).turn
-    return found.size >= _NAMED and bool(abs(wrapped(found.turn - turn)) < _ASIDE * abs(turn))
+    return found.size >= _AGREES and bool(abs(wrapped(found.turn - turn)) < _ASIDE * abs(turn))
 
 
-def course_causes(found: CourseFound) -> List[Cause]:
-    if found.size < _NAMED:
+def course_causes(found: CourseFound, named: float) -> List[Cause]:
+    """Return that the sonar is turned, where it is by at least so many deviations."""
+    if found.size < named:
         return []
     angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(found.deviation):.0f} deg"
     text = f"the sonar is turned by {angle} against tf, if the vehicle usually goes where its heading points"

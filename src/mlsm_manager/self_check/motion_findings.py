@@ -12,7 +12,15 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, is_same
-from mlsm_manager.self_check.course import NOT_TOLD, CourseFound, course_causes, course_of, odometry_agrees
+from mlsm_manager.self_check.course import (
+    NAMED,
+    NAMED_LIVE,
+    NOT_TOLD,
+    CourseFound,
+    course_causes,
+    course_of,
+    odometry_agrees,
+)
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
 from node_support.geometry import move_of, rotated, transformed
@@ -65,7 +73,10 @@ class MotionFindings:
 
     def with_course(self, path: Track) -> "MotionFindings":
         """Return the findings of a whole run with what its path T_map_base says of the sonar's mount."""
-        return self._with(self._course_of(path), self.places[0], True) if self.is_told else self
+        if not self.is_told:
+            return self
+        course = self._course_of(path)
+        return self._with(course, course_causes(course, NAMED), self.places[0], True)
 
     def with_newest_course(self, path: Track, begin: np.ndarray, before: CourseFound) -> "MotionFindings":
         """Return the findings of the newest scans likewise.
@@ -77,10 +88,13 @@ class MotionFindings:
         if not self.is_told:
             return self
         course = self._course_of(path).after(before)
-        return self._with(course, begin, course != NOT_TOLD or self.run.begins_map)
+        causes = course_causes(course, NAMED_LIVE)
+        return self._with(course, causes, begin, course != NOT_TOLD or self.run.begins_map)
 
-    def _with(self, course: CourseFound, begin: np.ndarray, may_hide: bool) -> "MotionFindings":
-        """begin: (2,) m, about which a turn of the sonar turns the places.
+    def _with(
+        self, course: CourseFound, causes: List[Cause], begin: np.ndarray, may_hide: bool
+    ) -> "MotionFindings":  # fmt: skip
+        """causes: that the course names. begin: (2,) m, about which a turn of the sonar turns the places.
 
         may_hide: whether the odometry hides some of that turn, where no course tells which is turned.
         """
@@ -90,7 +104,7 @@ class MotionFindings:
             turn = mounts = direction.hidden
         gone = places - begin
         aside = rotated(gone, np.full(len(gone), turn)) - gone
-        causes = [*self.causes, *(course_causes(course) or self._calibration_causes())]
+        causes = [*self.causes, *(causes or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
         by_mounts = mounts * float(np.hypot(*gone[-1]))
         return replace(self, causes=causes, apart=apart, course=course, mounts=mounts, by_mounts=by_mounts)

@@ -16,7 +16,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.course import NOT_TOLD, CourseFound, course_causes, course_of, odometry_agrees
+from mlsm_manager.self_check.course import NAMED, NOT_TOLD, CourseFound, course_causes, course_of, odometry_agrees
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
 
@@ -199,7 +199,7 @@ def test_a_sonar_is_turned_where_the_vehicle_never_goes_ahead(turn, named):
     poses = WHOLE.track.poses + np.radians([0.0, 0.0, turn])
     found = course_of(Track(WHOLE.track.times, poses), np.pi)
     assert np.degrees(found.turn) == pytest.approx(turn, abs=1.0)
-    assert len(course_causes(found)) == named
+    assert len(course_causes(found, NAMED)) == named
 
 
 @pytest.mark.parametrize(("stretches", "strafes"), [(9, False), (40, True)])
@@ -265,7 +265,7 @@ def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_on
 
 def test_a_vehicle_that_goes_back_tells_nothing_of_the_mount_where_its_odometry_does():
     path = Track(WHOLE.track.times, WHOLE.track.poses + np.radians([0.0, 0.0, 180.0]))
-    assert course_causes(course_of(path)) == []
+    assert course_causes(course_of(path), NAMED) == []
 
 
 @pytest.mark.parametrize(("reported", "is_strafing"), [(-30.0, True), (-25.0, True), (0.0, False), (30.0, False)])
@@ -279,4 +279,4 @@ def test_a_vehicle_strafes_where_its_odometry_says_so_as_well(reported, is_straf
 def test_a_vehicle_that_strafes_tells_nothing_of_the_mount():
     yaws = WHOLE.track.poses[:, 2] + 2.0 * np.sin(WHOLE.track.times / 17.0)
     path = Track(WHOLE.track.times, np.column_stack([WHOLE.track.poses[:, :2], yaws]))
-    assert course_causes(course_of(path)) == []
+    assert course_causes(course_of(path), NAMED) == []
