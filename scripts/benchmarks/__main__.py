@@ -11,8 +11,8 @@ from typing import List
 from benchmarks.harness import Row, print_table
 
 SECTIONS = {
-    "large-map": "map_figures.rows", "carving": "map_bag_figures.carving_rows",
-    "map-bag": "map_bag_figures.rows", "matching": "matching_figures.rows", "chain": "chain_figures.rows",
+    "large-map": "map_figures.rows", "carving": "carving_figures.rows",
+    "matching": "matching_figures.rows", "chain": "chain_figures.rows",
     "shapes": "shape_figures.rows", "simulation": "simulation_figures.rows",
 }  # fmt: skip
 """Names of the functions that return their rows: a study need not import what it does not use."""

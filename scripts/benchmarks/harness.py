@@ -1,15 +1,13 @@
-"""What every benchmark shares: where recordings are, timing a call, a run of map_bag, and printing a table."""
+"""What every benchmark shares: where recordings are, timing a call, running a node, and printing a table."""
 
 import argparse
-import json
 import os
 import subprocess
 import sys
-import tempfile
 import time
 from functools import partial
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Callable, List, Tuple
 
 import numpy as np
 
@@ -63,16 +61,6 @@ def run_node(program: str, *arguments: object) -> None:
     """Run nodes/`program` without its output; raises CalledProcessError."""
     command = [sys.executable, str(ROOT / "nodes" / program), *map(str, arguments)]
     subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-
-
-def mapped(bag: Path, *options: str) -> Tuple[Dict[str, Any], float]:
-    """Return summary.json of a run of map_bag, and the CPU seconds of the run with its imports."""
-    with tempfile.TemporaryDirectory() as out:
-        before = os.times()
-        run_node("map_bag", bag, "--out", out, *options)
-        after = os.times()
-        summary = json.loads((Path(out) / "summary.json").read_text())
-    return summary, after.children_user + after.children_system - before.children_user - before.children_system
 
 
 def median_seconds(

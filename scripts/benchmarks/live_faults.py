@@ -16,7 +16,7 @@ from benchmarks.fault_rows import faults
 from benchmarks.faults import fault_parser, source
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
-from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
+from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state
 from mlsm_manager.offline.bag_mapping import with_steady_head
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import ReplayParameters
@@ -62,11 +62,15 @@ def _told(localiser: Localiser, time: float, odometry: np.ndarray) -> Optional[T
     now, causes = localiser.place_now(time, odometry), localiser.following.causes()
     if now is None:
         return None
-    doubts = doubts_of(now, causes, localiser.verdicts(), {}, "")
-    state, _ = position_state(now, localiser.is_lost, is_provisional=False, doubts=doubts)
     place = localiser.estimator.belief.theta[POSITION]
     named = [cause.text for cause in causes if not cause.is_mended]
-    return Told(time, place, now.deviation, state is PositionState.GOOD, named)
+    return Told(time, place, now.deviation, is_called_good(localiser, now), named)
+
+
+def is_called_good(localiser: Localiser, place: Optional[PlaceNow], is_provisional: bool = False) -> bool:
+    """Return whether live nodes call a position good."""
+    doubts = doubts_of(place, localiser.following.causes(), localiser.verdicts(), {}, "")
+    return position_state(place, localiser.is_lost, is_provisional, doubts)[0] is PositionState.GOOD
 
 
 def line(told: List[Told], whole: List[Told], begin: float) -> str:

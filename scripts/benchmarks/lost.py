@@ -13,12 +13,12 @@ import numpy as np
 
 from benchmarks.canals import made_canal, made_path, recorded_along
 from benchmarks.harness import benchmark_parser
+from benchmarks.live_faults import is_called_good
 from benchmarks.paths import replay_input
 from benchmarks.tours import simulated
 from mlsm_manager.localisation.joint_session import moved
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
-from mlsm_manager.localisation.place_now import PositionState, doubts_of, position_state
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -107,9 +107,7 @@ def started(localiser: Localiser, scans: Iterable[Scan], truth: Track) -> Start:
     for count, scan in enumerate(scans, 1):
         update = localiser.take_scan(scan).scan
         place = localiser.place_now(scan.reference_time, scan.reference_pose)
-        doubts = doubts_of(place, localiser.following.causes(), localiser.verdicts(), {}, "odom")
-        state, _ = position_state(place, localiser.is_lost, update.provisional, doubts)
-        if state is PositionState.GOOD:
+        if is_called_good(localiser, place, update.provisional):
             error = update.belief.theta[:2] - truth.at(np.array([scan.reference_time]))[0, :2]
             return Start(count, float(np.hypot(*error)), place.deviation)
     return Start(None, np.nan, np.nan)

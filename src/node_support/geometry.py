@@ -4,7 +4,7 @@ Planar poses hold x, y and yaw in their last axis; poses in space are 4x4 matric
 """
 
 import math
-from typing import Sequence, TypeVar
+from typing import Sequence, Tuple, TypeVar
 
 import numpy as np
 
@@ -30,6 +30,12 @@ def unwrapped(angle: float, near: float) -> float:
 def grid(line: np.ndarray) -> np.ndarray:
     """Return the points (n, 2) of a square grid with sides `line`."""
     return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
+
+
+def members(sizes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return the group (n,) of each member of groups with `sizes` (g,), one after the other, and its number in it."""
+    groups = np.repeat(np.arange(len(sizes)), sizes)
+    return groups, np.arange(len(groups)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
 
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:

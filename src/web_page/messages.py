@@ -64,11 +64,11 @@ def parsed(text: Union[str, bytes]) -> Request:
         (verb,) = asked
         given = asked[verb]
         if verb == "hello":
-            return Hello(_word(given["run"]), _number(given["revision"]))
+            return Hello(_of_type(str, given["run"]), _of_type(int, given["revision"]))
         if verb == "mark":
             return SetMark(Mark(given["name"], given["x"], given["y"]))
         if verb == "delete":
-            return DeleteMark(_word(given["name"]))
+            return DeleteMark(_of_type(str, given["name"]))
     except (ValueError, TypeError, KeyError, RecursionError) as error:
         if isinstance(error, RefusedInput):
             raise
@@ -76,15 +76,9 @@ def parsed(text: Union[str, bytes]) -> Request:
     raise RefusedInput(_KIND, f"{verb[:80]!r}, must be hello, mark or delete")
 
 
-def _word(value: Any) -> str:
-    if not isinstance(value, str):
-        raise TypeError("must be a text")
-    return value
-
-
-def _number(value: Any) -> int:
-    if not isinstance(value, int):
-        raise TypeError("must be a whole number")
+def _of_type(kind: type, value: Any) -> Any:
+    if not isinstance(value, kind):
+        raise TypeError(f"must be of type {kind.__name__}")
     return value
 
 

@@ -111,8 +111,6 @@ def test_every_benchmark_that_a_page_names_exists(page):
 
 
 def test_every_benchmark_can_be_imported():
-    from benchmarks.__main__ import STUDIES
-
     for study in STUDIES:
         import_module(f"benchmarks.{study}")
 

@@ -9,6 +9,7 @@ from mlsm_manager.joint_solver.odometry_log import GrowingArray, GrowingTable, M
 from mlsm_manager.joint_solver.surface_points import Sights, SurfacePoints, post_points
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
+from node_support.geometry import members
 
 _SHORTEST_SCAN = 1.0  # s: a first scan without points still needs a beginning before its end
 _POINTS_OF_PLATEAU = 2.0  # per echo: plateaus have 3 to 4 at a spacing of 1 m, peaks 1.0 to 1.3
@@ -68,7 +69,8 @@ class PointTable:
         """Return the rows (n,) of the points of `scans` (s,) int, one scan after the other, and how many (s,)."""
         starts, ends = self._starts.values[scans], self._starts.values[scans + 1]
         counts = ends - starts
-        return np.repeat(ends - np.cumsum(counts), counts) + np.arange(counts.sum()), counts
+        scan, number = members(counts)
+        return starts[scan] + number, counts
 
     def points(self, rows: np.ndarray) -> Tuple[SurfacePoints, np.ndarray]:
         """Return the points in `rows` (n,) int, and the scan (n,) int of each."""

@@ -18,6 +18,7 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, cell_keys, keys_of
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry import members
 from node_support.parameters import ParameterSet, parameter
 
 _MOST_POINTS = 50
@@ -85,11 +86,11 @@ def beam_paths(beams: FirstEchoes, width: float, resolution: float) -> BeamPaths
     arm = beams.echoes[:, :2] - beams.origins[:, :2]
     reach = np.hypot(*arm.T)
     steps = np.maximum((reach / resolution - 0.5).astype(np.int64), 0)
-    beam = np.repeat(np.arange(len(steps)), steps)
-    distance = (np.arange(len(beam)) - np.repeat(np.cumsum(steps) - steps, steps)) * resolution
+    beam, cell = members(steps)
+    distance = cell * resolution
     across = (width * distance / resolution).astype(np.int64) + 1
-    sample = np.repeat(np.arange(len(beam)), across)
-    share = (np.arange(len(sample)) - np.repeat(np.cumsum(across) - across, across) + 0.5) / across[sample] - 0.5
+    sample, number = members(across)
+    share = (number + 0.5) / across[sample] - 0.5
     beam, distance = beam[sample], distance[sample]
     angle = np.arctan2(arm[:, 1], arm[:, 0])[beam] + width * share
     places = beams.origins[beam, :2] + distance[:, np.newaxis] * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -124,9 +125,7 @@ def pairs_of_groups(starts: np.ndarray, count: int, owners: np.ndarray) -> Tuple
 
     Members 0 to `count` - 1 are sorted by group; group g begins at `starts[g]`. owners: (n,) the group of each.
     """
-    sizes = np.diff(np.append(starts, count))[owners]
-    owner = np.repeat(np.arange(len(owners)), sizes)
-    rank = np.arange(len(owner)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
+    owner, rank = members(np.diff(np.append(starts, count))[owners])
     return owner, starts[owners][owner] + rank
 
 

@@ -17,7 +17,7 @@ from scipy.spatial import cKDTree
 from mlsm_manager.scan_matching.scan import Belief, MatchResult, MatchStatus, Scan
 from mlsm_manager.scan_matching.scan_path import ERRORS, POSE, POSITION, RATE, YAW
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource, all_of
-from node_support.geometry import composed, move_of, rotated, transformed, wrapped
+from node_support.geometry import composed, members, move_of, rotated, transformed, wrapped
 from node_support.parameters import ParameterSet, parameter
 
 _MEDIANS = 3.0  # of normal errors across a wall 4 % are farther
@@ -134,10 +134,10 @@ def _padded_members(cell_of_block: np.ndarray, cells: int) -> np.ndarray:
     """Return (cells, k) block indices, -1 where a cell has fewer than k."""
     order = np.argsort(cell_of_block, kind="stable")
     sizes = np.bincount(cell_of_block, minlength=cells)
-    rank = np.arange(len(order)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
-    members = np.full((cells, int(sizes.max())), -1, dtype=np.int64)
-    members[cell_of_block[order], rank] = order
-    return members
+    cell, rank = members(sizes)
+    padded = np.full((cells, int(sizes.max())), -1, dtype=np.int64)
+    padded[cell, rank] = order
+    return padded
 
 
 _FEWEST_POINTS = 3  # the same as a line through times needs

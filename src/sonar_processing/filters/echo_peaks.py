@@ -8,6 +8,8 @@ from typing import Tuple
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 
+from node_support.geometry import members
+
 _ONE_STRENGTH = 0.9  # share of the strengths above 0 that equal the strongest
 _QUANTILE = 0.4  # over the beams of a turn: what is heard in most directions at a range is no echo
 _LEVEL = 0.75  # of the autocorrelation: high on its flank, where slanting walls lengthen the echoes least
@@ -197,7 +199,7 @@ def points_along_runs(image: np.ndarray, threshold: float, spacing: float) -> Pe
     lengths = np.nonzero(change < 0)[1] - starts
     spacing = max(spacing, 1.0)
     counts = np.ceil(lengths / spacing - _ROUNDING).astype(np.int64)
-    within = np.arange(counts.sum()) - np.repeat(np.cumsum(counts) - counts, counts)
-    bins = np.repeat(starts, counts) + np.floor(within * spacing + _ROUNDING)
-    beams = np.repeat(beams, counts)
+    runs, within = members(counts)
+    bins = starts[runs] + np.floor(within * spacing + _ROUNDING)
+    beams = beams[runs]
     return Peaks(beams, bins, image[beams, bins.astype(np.int64)])

@@ -87,8 +87,7 @@ class NearestSurface:
 
     def __init__(self, world: World) -> None:
         corners = world.vertices[world.faces]
-        normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        self._faces = np.flatnonzero(np.einsum("ij,ij->i", normals, normals) > 0.0)
+        self._faces = np.flatnonzero(world.normals.any(axis=1))
         self._corners = corners[self._faces]
         self._groups = TriangleGroups(self._corners)
 

@@ -14,6 +14,7 @@ from mlsm_manager.surface_map.export.rasters import elevation, occupancy, write_
 from mlsm_manager.surface_map.map_file import ENDING, ExportError, Layer, StoredMap, write_map
 from node_support.errors import needed
 from node_support.files import whole_file, write_whole
+from node_support.geometry import members
 
 GEOTIFF = ".tif"
 _PLY_TYPES = {"f8": "double", "u4": "uint", "u1": "uchar"}
@@ -163,8 +164,7 @@ def block_voxels(blocks: Blocks) -> Tuple[np.ndarray, np.ndarray]:
     number = last - first + 1
     if number.sum() > _MOST_VOXELS:
         raise ExportError(f"{int(number.sum())} voxels, must be at most {_MOST_VOXELS}; crop the map first")
-    owners = np.repeat(np.arange(len(blocks)), number)
-    rank = np.arange(len(owners)) - np.repeat(np.cumsum(number) - number, number)
+    owners, rank = members(number)
     voxels = np.column_stack([blocks.cells[owners], first[owners] + rank])
     if not (voxels.min(initial=0) >= -_HALF_TREE and voxels.max(initial=0) < _HALF_TREE):
         reach = _HALF_TREE * blocks.resolution

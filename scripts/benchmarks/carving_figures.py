@@ -1,36 +1,21 @@
-"""How much of a core map_bag takes for whole real runs, and how much of that is carving; no truth is read."""
+"""How much of a scan's time carving takes in a real run; no truth is read."""
 
 from typing import List
 
 import numpy as np
 
-from benchmarks.harness import MARINA, WHOLE_MARINA, Row, cpu_seconds, mapped, missing_row, recorded
+from benchmarks.harness import MARINA, Row, cpu_seconds, missing_row, recorded
 from mlsm_manager.localisation.parameters import EstimatorName
 from mlsm_manager.offline.map_bag import map_bag_arguments
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.suited_parameters import odometry_of, with_odometry
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
-_WANTED = {"": 500, "--refine": 150, "--refine --check": 150}
-"""Times real time that are wanted, by the options."""
 _WARM_UP = 10
 """Scans until there is a map to be matched with and free space to be known."""
 
 
 def rows() -> List[Row]:
-    """Return CPU time and times real time for each set of options."""
-    bag, found = recorded(WHOLE_MARINA), []
-    if not bag.is_file():
-        return [missing_row(WHOLE_MARINA)]
-    for options, wanted in _WANTED.items():
-        summary, cpu = mapped(bag, *options.split())
-        speed = summary["times_real_time"] * summary["seconds"] / cpu
-        measured = f"{cpu:.1f} s CPU, {speed:.0f} times real time"
-        found.append((f"map_bag {WHOLE_MARINA} {options}", measured, f">= {wanted}"))
-    return found
-
-
-def carving_rows() -> List[Row]:
     """Return the share of a scan's time that carving takes, with each estimator."""
     if not recorded(MARINA).is_file():
         return [missing_row(MARINA)]
