@@ -1,7 +1,6 @@
 #!/usr/bin/env python3
 """How much of a processor a driver needs, and whether it loses beams. The argument is the sonar."""
 
-import os
 import sys
 import time
 import unittest
@@ -17,9 +16,10 @@ from graph import PACKAGE_ROOT, launched, run
 
 from underwater_map_construction.msg import SonarScanLine
 
-sys.path.insert(0, str(PACKAGE_ROOT / "test/unit/sonar_driver"))
+sys.path += [str(PACKAGE_ROOT / "test/unit/sonar_driver"), str(PACKAGE_ROOT / "scripts")]
 
 from emulated_drivers import free_udp_port
+from soaking.processes import held
 
 # Another program may take the processor during one attempt.
 ATTEMPTS = 8
@@ -91,9 +91,9 @@ def _load_of(seconds: float) -> DriverLoad:
     start = len(listener.messages)
     first = listener.wait_for_more(1)[0].header
     pid = _process(driver)
-    cpu_before = _cpu_seconds(pid)
+    cpu_before = held(pid).cpu
     listener.wait(lambda received: (received[-1].header.stamp - first.stamp).to_sec() >= seconds)
-    last, cpu = listener.messages[-1].header, _cpu_seconds(pid) - cpu_before
+    last, cpu = listener.messages[-1].header, held(pid).cpu - cpu_before
     after = values(health.wait_for_more()[0])
     for one in (health, listener):
         one.close()
@@ -113,13 +113,6 @@ def _slowness() -> float:
     for step in range(STEPS):
         total += step % 7
     return max((time.process_time() - before) / SECONDS, 1.0)
-
-
-def _cpu_seconds(pid: int) -> float:
-    """Return the processor time that a process has used so far."""
-    with open(f"/proc/{pid}/stat") as file:
-        fields = file.read().rsplit(")", 1)[1].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,6 @@
 """Rays, and what they meet off mirrors."""
 
 import math
-import sys
 
 import numpy as np
 import pytest
@@ -11,7 +10,7 @@ from hypothesis import strategies as st
 from node_support.geometry import pose_matrix
 from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer, FanWithSideLobes
 from sonar_simulator.echoes.ray_caster import Mirrors, RayCaster, legs
-from sonar_simulator.world.world import MATERIALS, MissingPackageError, Shape, World
+from sonar_simulator.world.world import MATERIALS, Shape, World
 
 HALF = np.array([60.0, 25.0, 5.0])
 ROOM = RayCaster(World.from_shapes("room", [Shape("room", "box", np.eye(4), tuple(2.0 * HALF))]))
@@ -54,14 +53,6 @@ def test_no_rays_have_no_distances():
     assert ROOM.hits(np.empty((0, 3)), np.empty((0, 3)))[0].shape == (0,)
 
 
-def test_without_embreex_the_error_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "embreex.rtcore_scene", None)
-    expected = r"it casts the simulator's rays; install it: \S+ -m pip install embreex$"
-    with pytest.raises(MissingPackageError, match=expected):
-        RayCaster(World.from_shapes("w", [Shape("b", "sphere", np.eye(4), (1.0,))]))
-
-
-pytest.importorskip("embreex")
 STEEL, ROCK = MATERIALS["steel"], MATERIALS["rock"]
 
 
