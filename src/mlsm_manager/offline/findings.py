@@ -5,13 +5,12 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, PartResult, solved_part
+from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, PartResult, fit_of, solved_part
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns, expected_deviations
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, RUN_COLUMNS
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.offline.trust import KnownPlaces, Trust, radii
@@ -141,7 +140,8 @@ def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
     directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
     expected = expected_deviations(known.places - known.places[0], lengths, directions)
     known = known._replace(covariances=known.covariances + refined.motion.spread(known.times))
-    known = known if strafing is None else known.or_on(_known_by(fitted(strafing), strafing.solution))
+    # One fit tells how uncertain it may be; a search for the best path takes minutes and widens it by 1 % as a rule.
+    known = known if strafing is None else known.or_on(_known_by(fit_of(strafing.solution), strafing.solution))
     return _BestPath(refined.poses, refined.solution, *known, expected, refined.motion.mounts)
 
 
