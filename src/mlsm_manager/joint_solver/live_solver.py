@@ -120,8 +120,7 @@ class LiveSolver:
     def solution(self) -> Solution:
         """The run as it is known now, until the next scan."""
         term = self.estimates[-1].prior_term if self.estimates else None
-        known = self._known
-        return Solution(self.log, self.parameters, self.state, self.submaps, known, term, self.fixes, known is None)
+        return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
 
     @property
     def told(self) -> Optional[Gaussian]:

@@ -150,7 +150,7 @@ class Solution:
 
     state: the unknowns of the run in `log`. submaps: which of its scans are compared with each other. known: surfaces
     that were in the map before the run. prior_term: what a mixture of priors added to the newest node; None before.
-    fixes: of single scans. begins_map: whether the run, or the one of which this is a part, defines the map.
+    fixes: of single scans.
     """
 
     log: RunLog
@@ -160,7 +160,6 @@ class Solution:
     known: Optional[KnownSurfaces] = None
     prior_term: Optional[PriorTerm] = None
     fixes: Fixes = field(default_factory=Fixes)
-    begins_map: bool = True
 
     def with_state(self, state: State) -> "Solution":
         return replace(self, state=state)
@@ -169,8 +168,7 @@ class Solution:
         """Return `scan` and all later ones as a run that begins with it, without what was known before."""
         state = State(self.state.nodes[scan:].copy(), self.state.run.copy())
         state.nodes[:, :YAW] -= state.nodes[0, :YAW]
-        submaps = Submaps(self.submaps.numbers[scan:])
-        return Solution(self.log.since(scan), self.parameters, state, submaps, begins_map=self.begins_map)
+        return Solution(self.log.since(scan), self.parameters, state, Submaps(self.submaps.numbers[scan:]))
 
     def move_newest(self, shares: np.ndarray, shift: np.ndarray) -> None:
         """Move the newest nodes by `shares` (k,) of a shift (2,) m."""

@@ -82,14 +82,13 @@ class MotionFindings:
         """Return the findings of the newest scans likewise.
 
         begin: (2,) m, where these would put the place from which the vehicle was followed. before: what older scans
-        told of the mount. A run that was found in a map turns with the sonar, and hides nothing before a course is
-        told.
+        told of the mount. Before any course a short run turns with the sonar, and hides nothing.
         """
         if not self.is_told:
             return self
         course = self._course_of(path).after(before)
         causes = course_causes(course, NAMED_LIVE)
-        return self._with(course, causes, begin, course != NOT_TOLD or self.run.begins_map)
+        return self._with(course, causes, begin, course != NOT_TOLD)
 
     def _with(
         self, course: CourseFound, causes: List[Cause], begin: np.ndarray, may_hide: bool
@@ -99,9 +98,9 @@ class MotionFindings:
         may_hide: whether the odometry hides some of that turn, where no course tells which is turned.
         """
         places, direction = self.places, NOT_TOLD if course.is_told else self._direction
-        turn, mounts = (direction.turn, direction.deviation) if direction.is_told else (course.unexplained, 0.0)
-        if mounts and may_hide:
-            turn = mounts = direction.hidden
+        turn, mounts = course.unexplained, 0.0
+        if direction.is_told:
+            turn, mounts = (direction.hidden, direction.hidden) if may_hide else (direction.turn, 0.0)
         gone = places - begin
         aside = rotated(gone, np.full(len(gone), turn)) - gone
         causes = [*self.causes, *(causes or self._calibration_causes())]

@@ -12,14 +12,17 @@ from benchmarks.harness import mapped_as
 from made_recordings import SECONDS, scans_in, strafing, touring
 from made_scans import later
 
+from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.bag_mapping import with_steady_head
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
+from mlsm_manager.self_check.course import CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.live_causes import LiveCauses
+from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
 
@@ -32,12 +35,6 @@ SHORT = {"ahead": shortened(WHOLE, 200.0), "aside": shortened(ASIDE, 200.0)}
 
 def found_in(recording):
     return echo_findings(scans_in(recording), recording.sonar_in_base)
-
-
-def follow_first_scans_of_a_turned_sonar(localiser):
-    for scan in scans_in(broken.mount_turned(WHOLE, 14.0))[:9]:
-        localiser.take_scan(scan)
-    localiser.look_for_causes()
 
 
 def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on():
@@ -195,12 +192,16 @@ def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows(reco
     assert np.trace(localiser.following.found.covariance([])) > 0.05
 
 
-def test_a_turned_sonar_turns_the_map_that_the_run_begins_and_none_in_which_it_is_found():
-    first, found_in_map = (LocaliserParameters().build_localiser(WHOLE.sonar_in_base) for _ in range(2))
-    follow_first_scans_of_a_turned_sonar(first)
-    found_in_map.restore(first.stored("map", {}, 0.0, ""), False)
-    follow_first_scans_of_a_turned_sonar(found_in_map)
-    assert first.following.found.by_mounts > 2.0 * found_in_map.following.found.by_mounts > 0.0
+def test_a_turned_sonar_turns_the_newest_place_about_where_the_run_began():
+    localiser = LocaliserParameters().build_localiser(WHOLE.sonar_in_base)
+    for scan in scans_in(WHOLE)[:7]:
+        localiser.take_scan(scan)
+    run = localiser.estimator.newest_run(6)
+    motion, track = MotionFindings(run, fit_of(run), WHOLE.track), shortened(WHOLE, 50.0).track
+    turned, here = CourseFound(np.radians(20.0), np.radians(2.0)), motion.places[-1]
+    near, far = (motion.with_newest_course(track, here - [0.0, gone], turned) for gone in (10.0, 100.0))
+    spreads = [np.sqrt(np.trace(each.spread(run.log.node_times[-1:])[0])) for each in (near, far)]
+    np.testing.assert_allclose(spreads, 2.0 * np.sin(turned.unexplained / 2.0) * np.array([10.0, 100.0]), rtol=0.01)
 
 
 def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
