@@ -140,7 +140,7 @@ def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
     directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
     expected = expected_deviations(known.places - known.places[0], lengths, directions)
     known = known._replace(covariances=known.covariances + refined.motion.spread(known.times))
-    # One fit tells how uncertain it may be; a search for the best path takes minutes and widens it by 1 % as a rule.
+    # One fit takes a second, a search for the best path minutes. On unbroken tours both state the same within 2 %.
     known = known if strafing is None else known.or_on(_known_by(fit_of(strafing.solution), strafing.solution))
     return _BestPath(refined.poses, refined.solution, *known, expected, refined.motion.mounts)
 

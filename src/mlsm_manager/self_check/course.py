@@ -17,7 +17,7 @@ _CLEAR = 10.0  # deviations: so large a turn is told however vague it is
 _ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
 _AGREES = 2.0  # deviations from which on a course may be the odometry's
 NAMED, NAMED_LIVE = 2.0, 3.0
-"""Deviations from which on a turn is named: live each scan asks anew, and 7 +- 3 deg were named in a marina."""
+"""Deviations from which on a turn is named. Live each scan looks for it; an unbroken marina showed 7 +- 3 deg."""
 _FAR = 3.0  # deviations: what goes farther aside counts as far
 LARGEST = np.radians(45.0)  # a vehicle that goes farther aside strafes, or goes back
 

@@ -36,7 +36,7 @@ class MotionFindings:
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
     nodes. course: how the sonar is turned by the vehicle's usual one. mounts: rad, by how much it may be where none
-    tells it; by_mounts: m, how far it may so turn the newest place about where the map begins.
+    tells it. by_mounts: m, how far that turns the newest place about the place where the run began.
     """
 
     run: Solution
@@ -82,7 +82,7 @@ class MotionFindings:
         """Return the findings of the newest scans likewise.
 
         begin: (2,) m, where these would put the place from which the vehicle was followed. before: what older scans
-        told of the mount. Before any course a short run turns with the sonar, and hides nothing.
+        told of the mount. Before a course could be looked for, a turn that the odometry may hide is not added.
         """
         if not self.is_told:
             return self
