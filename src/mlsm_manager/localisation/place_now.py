@@ -48,6 +48,12 @@ class PlaceNow(NamedTuple):
         return float(np.sqrt(max(self.deviation**2 - self.by_mounts**2, 0.0)))
 
     @property
+    def known_to(self) -> str:
+        """The deviation in words, and that in the map where the map's own direction is what is known worst."""
+        turned = f" ({self.in_map:.1f} m in the map, which may be turned)" if self.by_mounts > self.in_map else ""
+        return f"{self.deviation:.1f} m{turned}"
+
+    @property
     def is_unknown(self) -> bool:
         """Whether the place in the map is known too badly to be told."""
         return self.in_map > LARGEST_DEVIATION
@@ -86,12 +92,12 @@ def position_state(
     if place.is_unknown:
         return PositionState.UNKNOWN, "; ".join([f"position not known, {place.in_map:.1f} m", *doubts[:1]])
     if doubts:
-        return PositionState.DOUBTFUL, f"position doubtful, {place.deviation:.1f} m: {'; '.join(doubts)}"
+        return PositionState.DOUBTFUL, f"position doubtful, {place.known_to}: {'; '.join(doubts)}"
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
     if too_few(place.fixes):
-        return PositionState.PROVISIONAL, f"position provisional, {place.deviation:.1f} m: {too_few(place.fixes)}"
-    return PositionState.GOOD, f"position good, {place.deviation:.1f} m"
+        return PositionState.PROVISIONAL, f"position provisional, {place.known_to}: {too_few(place.fixes)}"
+    return PositionState.GOOD, f"position good, {place.known_to}"
 
 
 def _clause(cause: Cause, time: float) -> str:
