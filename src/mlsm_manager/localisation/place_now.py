@@ -50,8 +50,8 @@ class PlaceNow(NamedTuple):
     @property
     def known_to(self) -> str:
         """The deviation in words, and that in the map where the map's own direction is what is known worst."""
-        turned = f" ({self.in_map:.1f} m in the map, which may be turned)" if self.by_mounts > self.in_map else ""
-        return f"{self.deviation:.1f} m{turned}"
+        in_map = f" ({self.in_map:.1f} m in the map)" if self.by_mounts > self.in_map else ""
+        return f"{self.deviation:.1f} m{in_map}"
 
     @property
     def is_unknown(self) -> bool:

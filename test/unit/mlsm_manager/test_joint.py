@@ -243,7 +243,7 @@ def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lo
 @pytest.mark.parametrize(
     ("by_mounts", "told"),
     [
-        (5.0, (PositionState.GOOD, "position good, 6.0 m (3.3 m in the map, which may be turned)")),
+        (5.0, (PositionState.GOOD, "position good, 6.0 m (3.3 m in the map)")),
         (2.0, (PositionState.UNKNOWN, "position not known, 5.7 m")),
     ],
 )
