@@ -57,8 +57,8 @@ class MotionFault:
     def text(self) -> str:
         size = float(np.linalg.norm(self.sizes))
         if self.kind is FaultKind.STUCK:
-            missed = f" and missed {np.degrees(self.sizes[0]):.0f} deg" if size else ""
-            return f"the compass stuck for {self.end - self.begin:.0f} s{missed},"
+            missed = f" and missed {np.degrees(self.sizes[0]):.0f} deg," if size else ""
+            return f"the compass stuck for {self.end - self.begin:.0f} s{missed}"
         if self.kind in OF_DISTANCES:
             return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
         if self.kind is FaultKind.DRIFT:

@@ -45,6 +45,7 @@ _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may com
 _ROUNDS = 2
 _TURNED = np.radians(15.0)  # between turns that are tried of a vehicle whose compass stuck: scans then still meet
 _NATS_TURNED = 15.0  # by which one must be likelier than none: in a marina a wrong one of 24 was so by 4 nats
+_SHOWN = 10.0  # nats: its headings show that a compass stuck; where the vehicle went straight on nothing else does
 _MORE = 1.05  # times as much: true distances add 3 % in a marina, and a path that is wrongly halved 17 to 33 %
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
 _FAULTS = 3  # at most, one after the other
@@ -60,6 +61,11 @@ class _Trial(NamedTuple):
     track: Track
     gain: float
 
+    @property
+    def places(self) -> np.ndarray:
+        """(n, 2) m in map, of the nodes."""
+        return self.run.with_state(self.fit.state).node_places(np.arange(len(self.fit.node_times)))
+
 
 def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Suspicion) -> MotionFindings:
     """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
@@ -72,6 +78,7 @@ def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Sus
     if run.parameters.node_search is not None or not found.is_told or (are_few and not suspected):
         return found
     first = places = found.places
+    rivals: List[np.ndarray] = []
     suspected = [one for fault in suspected if not _is_missed_turn(fault, suspected) for one in _possible(fault)]
     for _ in range(_FAULTS + 1):
         errors = freed_errors(found.run)
@@ -82,12 +89,12 @@ def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Sus
         faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not suspicion.ranges_told]
         if len(found.causes) == _FAULTS or not faults:
             break
-        best = _best(found, faults)
+        best, rival = _best(found, faults)
         if best.gain < _needed(found, best.fault) or not best.fault.is_beyond(errors.times[-1]):
             break
-        found = _without(found, best)
+        found, rivals = _without(found, best), [*rivals, *rival]
         suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
-    others = [places, first] if found.causes else [places] if _errs(errors) and not are_few else []
+    others = [places, first, *rivals] if found.causes else [places] if _errs(errors) and not are_few else []
     return replace(found, apart=[other - found.places for other in others])
 
 
@@ -142,11 +149,21 @@ def with_other_ranges(run: Solution, track: Track) -> List[Tuple[SonarFault, Sol
     return [(trial.fault, replace(trial.run, state=trial.fit.state)) for trial in trials]
 
 
-def _best(found: MotionFindings, faults: Sequence[Fault]) -> _Trial:
-    best = max((_tried(found, fault) for fault in faults), key=_gain)
+def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[np.ndarray]]:
+    """Return the trial that makes the run likeliest, and where it went by another turn that is nearly as likely."""
+    trials = [_tried(found, fault) for fault in faults]
+    best = max(trials, key=_gain)
     for _ in range(_ROUNDS if isinstance(best.fault, SonarFault) else 1):
         best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_gain)
-    return best
+    return best, _rival(best, trials) if best.fault.kind is FaultKind.STUCK else []
+
+
+def _rival(best: _Trial, trials: Sequence[_Trial]) -> List[np.ndarray]:
+    """Return the places (n, 2) [m] of the turn that leads farthest from the best of a stuck compass, if any."""
+    least = best.fit.log_likelihood - _NATS_TURNED
+    others = [one for one in trials if is_same(one.fault, best.fault) and one.fit.log_likelihood > least]
+    places = [one.places for one in others]
+    return [max(places, key=lambda one: float(np.hypot(*(one - best.places).T).mean()))] if places else []
 
 
 def _possible(fault: Fault) -> List[Fault]:
@@ -187,8 +204,9 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)
     fit = fit_turned(run, track) if turns else fit_with(run, track, span)
     run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
-    needed = _NATS_TURNED if fault.kind is FaultKind.STUCK and fault.sizes[0] else 0.0
-    gain = fit.log_likelihood - found.fit.log_likelihood - needed
+    gain = fit.log_likelihood - found.fit.log_likelihood
+    if fault.kind is FaultKind.STUCK:
+        gain += (_SHOWN if found.is_alone else 0.0) - (_NATS_TURNED if fault.sizes[0] else 0.0)
     if fault.kind in OF_DISTANCES or fault.kind is FaultKind.CARRIED:
         more = _of_more(found, run, fit, fault.begin)
         # Pairs of scans that meet only with the current count if the pairs that met before speak for it, too.

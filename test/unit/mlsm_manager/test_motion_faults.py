@@ -56,7 +56,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (DISTANCES, "reported distances are 1.49 times the true ones"),
         (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
         (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
-        (replace(STUCK, sizes=(0.0,)), "the compass stuck for 20 s,"),
+        (replace(STUCK, sizes=(0.0,)), "the compass stuck for 20 s"),
         (RIGHT, "the compass stepped by 29 deg beside positions that are right,"),
     ],
 )
@@ -119,6 +119,18 @@ def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed()
     found = mapped_as(broken.odometry_freezes(alone, MIDDLE, 40.0), "--refine", "--odometry", "heading")
     assert_named_first(found.findings, "the compass stuck for 40 s and missed ")
     assert off(found).mean() < 1.0  # m
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("begin", "seconds", "is_known"), [(80.0, 200.0, True), (110.0, 150.0, False)])
+def test_a_compass_that_stuck_leaves_the_position_known_where_no_other_turn_is_nearly_as_likely(
+    begin, seconds, is_known
+):
+    """The vehicle went straight on meanwhile; the longer recording has more scans from before it."""
+    recording = shortened(source("harbour compass", 300.0), seconds, begin)
+    found = mapped_as(broken.odometry_freezes(recording, 170.0 - begin, 40.0), "--refine", "--odometry", "heading")
+    assert_named_first(found.findings, "the compass stuck for 40 s")
+    assert (found.findings.trust.deviations.max() < 3.0) == is_known  # m
 
 
 @pytest.mark.parametrize("degrees", [0.0, 25.0])
