@@ -11,10 +11,12 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, RUN_COLUMNS
 from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.offline.trust import KnownPlaces, Trust, radii
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.scan_matching.scan_path import POSITION
 from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
@@ -119,6 +121,21 @@ class _BestPath(NamedTuple):
     covariances: np.ndarray
     expected: np.ndarray
     mounts: float = 0.0
+
+    def carried_on(self, end: Optional[PlaceNow], newest: np.ndarray) -> "_BestPath":
+        """Return it with its last place too, where scans ended at least two turns of the head before the odometry.
+
+        end: how well that place is known. newest: (2, 2) m^2, how well the place of the last scan was.
+        """
+        if end is None or end.overdue <= 0.0:
+            return self
+        covariance = self.covariances[-1] + end.covariance[POSITION, POSITION] - newest
+        return self._replace(
+            times=np.append(self.times, end.time),
+            places=np.append(self.places, self.poses[-1:, :2], axis=0),
+            covariances=np.append(self.covariances, covariance[np.newaxis], axis=0),
+            expected=np.append(self.expected, self.expected[-1]),
+        )
 
 
 def _live_path(replayed: Replayed) -> _BestPath:
@@ -234,6 +251,7 @@ class Findings:
         else:
             calibration, best = Calibration.of_batch(solver, refined.batch), _refined_path(refined, replayed)
             closing = refined.closing
+        best = best.carried_on(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
         verdicts = [*_checks(replayed, best, calibration), *further]
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 

@@ -14,6 +14,7 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.parameters import LocaliserParameters, MapInput, MatchInput, MlsmCoreParameters
+from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.thesis_chain import ThesisChain
@@ -133,7 +134,8 @@ class Replayed:
 
     times: (m,) s of the odometry. odometry, corrected: (m, 3) T_odom_base and T_map_base, the second as it was known
     at each moment. updates: of all scans that were taken, oldest first. refused: how many were not, by the reason.
-    seconds: of a core for each scan. strafing: the run of a vehicle that strafes, which the scans may be as well; None
+    seconds: of a core for each scan. at_end: how well the place is known at the last of the times; None without a fix.
+    strafing: the run of a vehicle that strafes, which the scans may be as well; None
     where they tell that it does not, or nobody asked.
     """
 
@@ -144,6 +146,7 @@ class Replayed:
     updates: List[ScanUpdate]
     refused: Mapping[str, int]
     seconds: List[float]
+    at_end: Optional[PlaceNow]
     strafing: Optional[LiveSolver] = None
 
     @property
@@ -223,7 +226,8 @@ def replay(
         on_scans(1)
     corrections[done:] = _corrections(localiser, track, done, len(track.times))
     corrected = composed(corrections, track.poses)
-    return Replayed(track.times, track.poses, corrected, localiser.estimator, updates, refused, seconds)
+    at_end = localiser.place_now(float(track.times[-1]), track.poses[-1])
+    return Replayed(track.times, track.poses, corrected, localiser.estimator, updates, refused, seconds, at_end)
 
 
 def _corrections(localiser: Localiser, track: Track, start: int, end: int) -> np.ndarray:

@@ -104,6 +104,14 @@ def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
 
 
 @pytest.mark.long
+def test_where_beams_stop_the_position_is_less_and_less_known_until_the_end_of_the_odometry():
+    trust = mapped_as(broken.beams_stop(COMPASS, MIDDLE, 100.0), "--refine", *NAMED).findings.trust
+    last_scan, end = trust.deviations[-2:]
+    assert trust.times[-1] == COMPASS.track.times[-1]
+    assert end > 2.0 * last_scan
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(
     "recording",
     [
