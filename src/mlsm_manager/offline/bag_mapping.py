@@ -195,7 +195,10 @@ def _followed(
     other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
     changed = with_odometry(extracting, other.kind, options.fixed)
     again = _replayed(recording, scans, changed)
-    ranges = [] if ranges_are_told(recording.beams) else with_other_ranges(replayed.solver.solution, recording.track)
+    ranges = []
+    if not ranges_are_told(recording.beams):
+        suspected = echo_findings(scans, recording.sonar_in_base, replayed.corrections).suspected
+        ranges = with_other_ranges(replayed.solver.solution, recording.track, suspected)
     if again.solver is not None and strafes(replayed.solver, again.solver, ranges):
         return other, changed, again
     return odometry, parameters, replace(replayed, strafing=again.solver)

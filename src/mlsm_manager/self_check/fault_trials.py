@@ -133,19 +133,24 @@ def _of_sonar(found: MotionFindings) -> List[SonarFault]:
     With a compass alone no distance tells a change of ranges: what is heard before and after it must.
     """
     faults = [fault for fault in likeliest(found.run, found.fit) if fault.is_beyond(found.fit.node_times[-1])]
-    return faults + ([trial.fault for trial in _other_ranges(found)] if found.is_alone else [])
+    if not found.is_alone:
+        return faults
+    return faults + [trial.fault for trial in _likelier(found, changed_ranges(found.run))]
 
 
-def _other_ranges(found: MotionFindings) -> List[_Trial]:
-    """Return the trials of changes of ranges that make the run likelier."""
-    tried = (_tried(found, fault) for fault in changed_ranges(found.run))
-    return [trial for trial in tried if trial.gain > 0.0]
+def _likelier(found: MotionFindings, faults: Sequence[Fault]) -> List[_Trial]:
+    """Return the trials of those that make the run likelier."""
+    return [trial for trial in (_tried(found, fault) for fault in faults) if trial.gain > 0.0]
 
 
-def with_other_ranges(run: Solution, track: Track) -> List[Tuple[SonarFault, Solution]]:
-    """Return changes of ranges that make a run likelier of a vehicle that goes ahead, each with the run without it."""
+def with_other_ranges(run: Solution, track: Track, suspected: Sequence[Fault]) -> List[Tuple[SonarFault, Solution]]:
+    """Return changes of ranges that make a run likelier of a vehicle that goes ahead, each with the run without it.
+
+    suspected: what pairs of scans show; of it only such changes are tried.
+    """
     fit = fit_of(run)
-    trials = _other_ranges(MotionFindings(replace(run, state=fit.state), fit, track))
+    shown = [fault for fault in suspected if fault.kind is SonarKind.RANGES]
+    trials = _likelier(MotionFindings(replace(run, state=fit.state), fit, track), [*changed_ranges(run), *shown])
     return [(trial.fault, replace(trial.run, state=trial.fit.state)) for trial in trials]
 
 

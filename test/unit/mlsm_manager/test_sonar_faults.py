@@ -118,8 +118,9 @@ def test_where_beams_stop_the_position_is_less_and_less_known_until_the_end_of_t
         shortened(broken.mount_upside_down(COMPASS), 100.0),
         shortened(broken.range_changed(COMPASS, 50.0, 1.5), 100.0),
         broken.range_changed(COMPASS, MIDDLE, 0.5),
+        broken.range_changed(source("harbour compass", 400.0), 229.0, 0.511),
     ],
-    ids=["over", "longer ranges", "shorter ranges"],
+    ids=["over", "longer ranges", "shorter ranges", "shorter ranges near a wall"],
 )
 def test_a_fault_beside_a_compass_alone_does_not_make_the_vehicle_seem_to_strafe(recording):
     found = mapped_as(recording)
