@@ -36,8 +36,9 @@ _VAGUE_ALONE = (SonarKind.RANGES, SonarKind.TILT, FaultKind.SLIP, FaultKind.STEP
 # The same for a compass that errs by the heading, where it is alone or errs by less than 5 deg. Alone, an unbroken one
 # gains 16 in a canal and broken ones 22. Beside a DVL 4 deg gain up to 10 in an unbroken marina, 5 deg 80 in a harbour.
 _NATS_CIRCLE, _LARGE_CIRCLE = 20.0, np.radians(5.0)
-# No two settings of a sonar lie nearer to each other. Beside a compass alone unbroken parts of a marina change by 1.12.
-_LEAST_CHANGE = np.log(1.2)
+# The same for ranges that change by less than from one setting of a sonar to the next, beside a compass alone. An
+# unbroken marina gains 15 by 1.12, a tour whose ranges change by that 340.
+_NATS_SMALL, _SMALL_CHANGE = 50.0, np.log(1.2)
 _SIZED = (FaultKind.CARRIED, FaultKind.RIGHT)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
@@ -102,8 +103,8 @@ def _needed(found: MotionFindings, fault: Fault) -> float:
     """Return by how many nats a run must be likelier without a fault for that to be named."""
     if fault.kind is FaultKind.CIRCLE and (found.is_alone or np.linalg.norm(fault.sizes) < _LARGE_CIRCLE):
         return _NATS_CIRCLE
-    if found.is_alone and fault.kind is SonarKind.RANGES and abs(fault.sizes[0]) < _LEAST_CHANGE:
-        return np.inf
+    if found.is_alone and fault.kind is SonarKind.RANGES and abs(fault.sizes[0]) < _SMALL_CHANGE:
+        return _NATS_SMALL
     if found.is_alone and fault.kind in _VAGUE_ALONE:
         return _NATS_ALONE
     return _NATS_SONAR if isinstance(fault, SonarFault) else NAMED_FROM

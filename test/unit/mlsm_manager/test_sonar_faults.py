@@ -77,9 +77,10 @@ def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
         (mount_tilted(WHOLE, 25.0), "the sonar's plane is tilted by about 2", ()),
         (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", ()),
         (broken.range_changed(COMPASS, MIDDLE, 1.5), "the range setting changed untold: reported ranges", NAMED),
+        (broken.range_changed(COMPASS, MIDDLE, 1.15), "the range setting changed untold: reported ranges", NAMED),
         (broken.mount_upside_down(COMPASS), "the sonar is upside down, or its head turns", NAMED),
     ],
-    ids=["arm", "tilt", "ranges", "ranges by compass", "over by compass"],
+    ids=["arm", "tilt", "ranges", "ranges by compass", "a little by compass", "over by compass"],
 )
 def test_a_fault_is_named_first_and_the_path_fitted_without_it(recording, said, options):
     found = mapped_as(recording, "--refine", *options)
