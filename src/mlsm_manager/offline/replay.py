@@ -135,8 +135,8 @@ class Replayed:
     times: (m,) s of the odometry. odometry, corrected: (m, 3) T_odom_base and T_map_base, the second as it was known
     at each moment. updates: of all scans that were taken, oldest first. refused: how many were not, by the reason.
     seconds: of a core for each scan. at_end: how well the place is known at the last of the times; None without a fix.
-    strafing: the run of a vehicle that strafes, which the scans may be as well; None
-    where they tell that it does not, or nobody asked.
+    strafing: the run of a vehicle that strafes, which the scans may be as well; None where they tell that it does not,
+    or nobody asked.
     """
 
     times: np.ndarray
