@@ -254,7 +254,7 @@ def _on_path(live: LiveSolver, path: np.ndarray) -> State:
 
 def _path(live: LiveSolver, state: State) -> np.ndarray:
     """Return where the nodes are (n, 2) [m] in map."""
-    return live.solution.with_state(state).node_places(np.arange(len(state.nodes)))
+    return live.solution.with_state(state).places
 
 
 def _best(live: LiveSolver, fits: List[BatchResult], likelihoods: np.ndarray) -> BatchResult:

@@ -194,6 +194,11 @@ class Solution:
             qualities=points.qualities, shares=found[:, 10], by_run=found[:, 6:10].reshape(-1, 2, 2),
         )  # fmt: skip
 
+    @property
+    def places(self) -> np.ndarray:
+        """Where all nodes are, (n, 2) m in map."""
+        return self.node_places(np.arange(len(self.state.nodes)))
+
     def node_places(self, nodes: np.ndarray) -> np.ndarray:
         """Return where `nodes` (...) of the run are, (..., 2) m in map."""
         return self.log.node_poses(nodes)[..., :2] + self.state.nodes[nodes, :2]

@@ -163,7 +163,7 @@ def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
 
 
 def _known_by(fit: BatchResult, run: Solution) -> KnownPlaces:
-    places = run.with_state(fit.state).node_places(np.arange(len(fit.node_times)))
+    places = run.with_state(fit.state).places
     return KnownPlaces(fit.node_times, places, fit.pose_covariances[:, :2, :2])
 
 

@@ -103,7 +103,7 @@ def refitted_verdicts(run: Solution, batch: BatchResult, done: Done = lambda: No
         return state
 
     def path(state: State) -> np.ndarray:
-        return run.with_state(state).node_places(np.arange(len(state.nodes)))
+        return run.with_state(state).places
 
     deviations = np.sqrt(np.trace(batch.pose_covariances[:, :2, :2], axis1=1, axis2=2))
     start = displaced(batch.state, deviations, run.parameters.cut)

@@ -140,7 +140,7 @@ def _goes_on(run: Solution) -> Answer:
 
 def _length(run: Solution) -> float:
     """Return the length of the path of a run, m."""
-    return float(np.hypot(*np.diff(run.node_places(np.arange(len(run.state.nodes))), axis=0).T).sum())
+    return float(np.hypot(*np.diff(run.places, axis=0).T).sum())
 
 
 def goes_on_better(believed: Solution, alone: Solution) -> bool:

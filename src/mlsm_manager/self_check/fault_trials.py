@@ -63,9 +63,9 @@ class _Trial(NamedTuple):
     gain: float
 
     @property
-    def places(self) -> np.ndarray:
-        """(n, 2) m in map, of the nodes."""
-        return self.run.with_state(self.fit.state).node_places(np.arange(len(self.fit.node_times)))
+    def fitted(self) -> Solution:
+        """The run as `fit` says."""
+        return self.run.with_state(self.fit.state)
 
 
 def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Suspicion) -> MotionFindings:
@@ -152,7 +152,7 @@ def with_other_ranges(run: Solution, track: Track, suspected: Sequence[Fault]) -
     fit = fit_of(run)
     shown = [fault for fault in suspected if fault.kind is SonarKind.RANGES]
     trials = _likelier(MotionFindings(replace(run, state=fit.state), fit, track), [*changed_ranges(run), *shown])
-    return [(trial.fault, replace(trial.run, state=trial.fit.state)) for trial in trials]
+    return [(trial.fault, trial.fitted) for trial in trials]
 
 
 def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[np.ndarray]]:
@@ -168,8 +168,8 @@ def _rival(best: _Trial, trials: Sequence[_Trial]) -> List[np.ndarray]:
     """Return the places (n, 2) [m] of the turn that leads farthest from the best of a stuck compass, if any."""
     least = best.fit.log_likelihood - _NATS_TURNED
     others = [one for one in trials if is_same(one.fault, best.fault) and one.fit.log_likelihood > least]
-    places = [one.places for one in others]
-    return [max(places, key=lambda one: float(np.hypot(*(one - best.places).T).mean()))] if places else []
+    places = [one.fitted.places for one in others]
+    return [max(places, key=lambda one: float(np.hypot(*(one - best.fitted.places).T).mean()))] if places else []
 
 
 def _possible(fault: Fault) -> List[Fault]:
@@ -241,7 +241,7 @@ def _gain(trial: _Trial) -> float:
 
 
 def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:
-    run, fault = replace(trial.run, state=trial.fit.state), trial.fault
+    run, fault = trial.fitted, trial.fault
     # With a compass alone it may as well be the ranges before it that are wrong, and with them the size of all.
     is_size = found.is_alone and isinstance(fault, SonarFault) and fault.kind is SonarKind.RANGES
     length = float(np.abs(np.expm1(-fault.sizes[0])) / np.sqrt(2.0)) if is_size else 0.0

@@ -61,7 +61,7 @@ class MotionFindings:
     @property
     def places(self) -> np.ndarray:
         """(n, 2) m in map, of the nodes."""
-        return self.run.node_places(np.arange(len(self.run.state.nodes)))
+        return self.run.places
 
     def spread(self, times: np.ndarray) -> np.ndarray:
         """Return what these paths add to the covariances of the position at `times` (k,) [s], (k, 2, 2) m^2."""
