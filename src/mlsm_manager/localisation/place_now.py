@@ -49,7 +49,7 @@ class PlaceNow(NamedTuple):
 
     @property
     def known_to(self) -> str:
-        """The deviation in words, and that in the map where the map's own direction is what is known worst."""
+        """The deviation in words; in brackets that in the map, where most of it is the doubt how the map is turned."""
         in_map = f" ({self.in_map:.1f} m in the map)" if self.by_mounts > self.in_map else ""
         return f"{self.deviation:.1f} m{in_map}"
 

@@ -122,7 +122,7 @@ class _BestPath(NamedTuple):
     expected: np.ndarray
     mounts: float = 0.0
 
-    def carried_on(self, end: Optional[PlaceNow], newest: np.ndarray) -> "_BestPath":
+    def to_the_end(self, end: Optional[PlaceNow], newest: np.ndarray) -> "_BestPath":
         """Return it with its last place too, where scans ended at least two turns of the head before the odometry.
 
         end: how well that place is known. newest: (2, 2) m^2, how well the place of the last scan was.
@@ -251,7 +251,7 @@ class Findings:
         else:
             calibration, best = Calibration.of_batch(solver, refined.batch), _refined_path(refined, replayed)
             closing = refined.closing
-        best = best.carried_on(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
+        best = best.to_the_end(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
         verdicts = [*_checks(replayed, best, calibration), *further]
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 
