@@ -62,7 +62,7 @@ _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", 
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"
-_REVERSED = "compass counts the other way"
+_REVERSED, _ENDED = "compass counts the other way", "the last fix came"
 _OFTEN = {"at": 60.0, "every": 60.0}
 
 ROWS = (
@@ -106,7 +106,7 @@ ROWS = (
     FaultRow("head stops {} s untold", broken.head_stops, _STOOD, "seconds", 120.0, begins=True,
              others={"tells": False}),
     FaultRow("head reversed", broken.head_reversed, _OVER),
-    FaultRow("beams stop {} s", broken.beams_stop, "", "seconds", 120.0, begins=True),
+    FaultRow("beams stop {} s", broken.beams_stop, _ENDED, "seconds", 120.0, begins=True),
     FaultRow("{} of the beams missing", broken.beams_missing, "", "share", 0.3),
     FaultRow("range setting x {} untold", broken.range_changed, _GAIN, "factor", 0.5, True, True),
     FaultRow("range setting x {} untold", broken.range_changed, _GAIN, "factor", 1.5, True, True),

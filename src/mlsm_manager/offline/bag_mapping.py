@@ -45,7 +45,6 @@ from mlsm_manager.self_check.causes import (
     Suspicion,
     of_steps,
     of_stuck,
-    ranked,
 )
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
@@ -132,7 +131,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
         known = OdometryFound(OdometryKind.HEADING, reason)
         return _mapped(recording, [*causes, *heard.mounted, cause], known, options)
     causes += [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
-    return _judged(heard, odometry, parameters, replayed, refined, ranked(causes), options)
+    return _judged(heard, odometry, parameters, replayed, refined, causes, options)
 
 
 def _refined(
@@ -152,7 +151,7 @@ def _judged(
     heard: "_Heard", odometry: OdometryFound, parameters: ReplayParameters, replayed: Replayed,
     refined: Optional[Refined], causes: List[Cause], options: Namespace,
 ) -> MappedBag:  # fmt: skip
-    """Return what was made of a recording, checked, and of those added to its map. causes: ranked."""
+    """Return what was made of a recording, checked, and of those added to its map. causes: of what is wrong."""
     further = [heard.signs.turns()]
     if options.check:
         with _bar(REFITS, "fit", "check") as bar:

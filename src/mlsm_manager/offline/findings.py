@@ -17,9 +17,10 @@ from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.offline.trust import KnownPlaces, Trust, radii
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.scan_matching.scan_path import POSITION
-from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, widened
+from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, ranked, widened
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
+    LARGEST_DEVIATION,
     against_odometry,
     as_expected,
     halves_agree,
@@ -137,6 +138,15 @@ class _BestPath(NamedTuple):
             expected=np.append(self.expected, self.expected[-1]),
         )
 
+    def cause_of_end(self, end: Optional[PlaceNow]) -> List[Cause]:
+        """Return when the last fix came, where the position is lost since; `end` is how well the last one is known."""
+        if end is None or end.overdue <= 0.0:
+            return []
+        begin, deviations = end.time - end.age, radii(self.covariances)
+        grown = np.sqrt(max(deviations[-1] ** 2 - np.interp(begin, self.times, deviations) ** 2, 0.0))
+        text = f"the last fix came {end.age:.0f} s before the end,"
+        return [Cause(text, CERTAIN, begin)] if grown > LARGEST_DEVIATION else []
+
 
 def _live_path(replayed: Replayed) -> _BestPath:
     solver, strafing = replayed.solver, replayed.strafing
@@ -242,7 +252,7 @@ class Findings:
     ) -> "Findings":  # fmt: skip
         """Return what was found in a run that the joint solver has followed.
 
-        further: what other checks say. causes: of what is wrong, ranked. assumed: what nobody measured and the path
+        further: what other checks say. causes: of what is wrong. assumed: what nobody measured and the path
         rests on, if anything.
         """
         solver = replayed.solver
@@ -253,6 +263,7 @@ class Findings:
             closing = refined.closing
         best = best.to_the_end(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
         verdicts = [*_checks(replayed, best, calibration), *further]
+        causes = ranked([*causes, *best.cause_of_end(replayed.at_end)])
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 
     def to_mapping(self) -> Dict[str, Any]:

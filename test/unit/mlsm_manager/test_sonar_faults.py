@@ -105,11 +105,13 @@ def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
 
 
 @pytest.mark.long
-def test_where_beams_stop_the_position_is_less_and_less_known_until_the_end_of_the_odometry():
+def test_where_beams_stop_the_position_is_less_and_less_known_and_the_time_is_named():
     trust = mapped_as(broken.beams_stop(COMPASS, MIDDLE, 100.0), "--refine", *NAMED).findings.trust
     last_scan, end = trust.deviations[-2:]
     assert trust.times[-1] == COMPASS.track.times[-1]
     assert end > 2.0 * last_scan
+    assert trust.causes[0].text == "the last fix came 100 s before the end,"
+    assert trust.causes[0].begin == pytest.approx(trust.times[-2], abs=1.0)
 
 
 @pytest.mark.long
