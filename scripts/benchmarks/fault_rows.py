@@ -119,7 +119,7 @@ ROWS = (
     FaultRow("echoes {} bins longer", broken.echoes_longer, _GAIN, "bins", 10, begins=True),
     FaultRow("half of the circle blind", broken.half_blind, _BLIND),
     FaultRow("deaf {} s", broken.deaf, "", "seconds", 120.0, begins=True),
-    FaultRow("deaf to the end", broken.deaf, "", begins=True),
+    FaultRow("deaf to the end", broken.deaf, _ENDED, begins=True),
     FaultRow("spikes on {} of the beams", broken.spikes, "", "share", 1.0),
     FaultRow("spikes on {} of the beams", broken.spikes, "", "share", 0.31),
     FaultRow("spiral of interference", broken.spiral, "", begins=True),

@@ -90,8 +90,8 @@ def weighted(pairs: Pairs, factors: np.ndarray) -> Pairs:
 
 def add_comparisons(
     equations: NormalEquations, layout: Layout, met: Iterable[Comparison], parameters: SolverParameters, cut: float
-) -> int:
-    """Add the distances of points from the surfaces that they are compared with; return how many there are."""
+) -> None:
+    """Add the distances of points from the surfaces that they are compared with."""
     met = [one for one in met if len(one[0].rows)]
     terms = []
     for pairs, sources, targets in met:
@@ -104,7 +104,6 @@ def add_comparisons(
     if terms:
         scans, other_scans, information, gradient = (np.concatenate(each) for each in zip(*terms))
         equations.add_terms(_columns(scans, other_scans, layout), information, gradient)
-    return sum(len(pairs.rows) for pairs, _, _ in met)
 
 
 def summed(
@@ -157,7 +156,8 @@ _CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by 
 class PostComparisons:
     """Comparisons of echoes that stand alone, as of posts, in free scans with those of all others in view.
 
-    They are compared along the line of sight and across it. points: these echoes and the scan of each.
+    They are compared along the line of sight and across it. points: these echoes and the scan of each. compared: scans
+    of those that were compared last.
     """
 
     def __init__(
@@ -169,17 +169,19 @@ class PostComparisons:
         self._importance = parameters.post_confidence * np.repeat(importance, counts)
         self._parameters = replace(parameters, normal_deviation=0.0)
         self._lists: Optional[Neighbours] = None
+        self.compared = np.empty(0, dtype=int)
 
-    def add(self, equations: NormalEquations, layout: Layout, points: PlacedPoints, cut: float) -> int:
-        """Add the comparisons of those of the `points` that free scans heard; return how many there are."""
+    def add(self, equations: NormalEquations, layout: Layout, points: PlacedPoints, cut: float) -> None:
+        """Add the comparisons of those of the `points` that free scans heard."""
         if not self._importance.any():
-            return 0
+            return
         sources = points.selected(points.scans >= layout.first)
         if self._lists is None:
             self._lists = Neighbours(points, self._parameters.group_scans)
         near = _NEAR_IN_TIME * self._parameters.parts_per_turn
         pairs = weighted(post_pairs(self._lists, sources, points, cut, near), self._importance)
-        return add_comparisons(equations, layout, along_and_across(pairs, sources, points), self._parameters, cut)
+        self.compared = sources.scans[np.unique(pairs.rows)]
+        add_comparisons(equations, layout, along_and_across(pairs, sources, points), self._parameters, cut)
 
 
 def post_pairs(

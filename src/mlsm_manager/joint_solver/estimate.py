@@ -19,7 +19,7 @@ class LiveEstimate:
     the newest node's unknowns. run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
     own_covariance: the same if the frozen map had no error. reported_velocity: (3,) m/s, m/s, rad/s that the odometry
     reported in base_link. drift: how the true motion differs from it.
-    world_scale_deviation: of all lengths. comparisons: number of points compared with surfaces.
+    world_scale_deviation: of all lengths. comparisons: number of the scan's points that were compared with others.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
     mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
     prior_term: what a mixture of priors added; of no unknowns for models without one.

@@ -166,7 +166,6 @@ class Window:
         self._believed = prior_of(columns, np.zeros(len(columns)), deviations, held)
         self._known, self._are_apart = solution.known, solution.submaps.numbers.any()
         self._solution: Optional[EquationSolution] = None
-        self._comparisons = 0
         self._lists: List[Neighbours] = []
         self._met: List[Comparison] = []
         self._posts = self._post_comparisons()
@@ -218,9 +217,9 @@ class Window:
         if self._run.fixes.by_node:
             self._run.fixes.add(equations, self._layout, self._motion.poses, self.state.nodes[self._layout.first :])
         met = self._surfaces_met(cut)
-        self._comparisons = add_comparisons(equations, self._layout, met, self._parameters, cut)
+        add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:
-            self._comparisons += self._posts.add(equations, self._layout, self._run.placed(self._posts.points), cut)
+            self._posts.add(equations, self._layout, self._run.placed(self._posts.points), cut)
         self._prior.add(equations, self._newest_start, self.state.nodes[-1], self._own_covariance)
         add_loops(equations, self._layout, loops, self.state.nodes, start)
         self._solution = type(self)._solved(equations)
@@ -310,6 +309,12 @@ class Window:
         covariances = self._solution.covariances(self._layout.with_run(nodes), self._held_covariance)
         return [self._estimate(*each) for each in zip(nodes, *covariances)]
 
+    def _compared(self, scan: int) -> int:
+        """Return how many points of a scan were compared with those of others."""
+        rows = [pairs.rows[sources.scans[pairs.rows] == scan] for pairs, sources, _ in self._met]
+        posts = 0 if self._posts is None else np.count_nonzero(self._posts.compared == scan)
+        return len(np.unique(np.concatenate(rows))) + posts
+
     def _estimate(self, number: int, covariance: np.ndarray, own_covariance: np.ndarray) -> LiveEstimate:
         """Return what is known of node `number`, at the end of the scan before it; covariances: as LiveEstimate's."""
         T_odom_base, node = self._motion.poses[number - self._layout.first], self.state.nodes[number].copy()
@@ -321,6 +326,6 @@ class Window:
             covariance=covariance, own_covariance=own_covariance,
             world_scale_deviation=self._parameters.world_scale_deviation(self._log),
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
-            drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._comparisons,
+            drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._compared(number - 1),
             agreement=share, distance=distance, surfaces=surfaces, prior_term=self._prior.term,
         )  # fmt: skip

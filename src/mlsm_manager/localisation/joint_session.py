@@ -284,18 +284,22 @@ def expected_at(correction: np.ndarray, scan: Scan, expected: Belief) -> Belief:
 
 
 def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float) -> ScanUpdate:
-    """Return what a run that has just taken a scan made of it. seconds: that it took."""
+    """Return what a run that has just taken a scan made of it: no fix where none of its points met another.
+
+    seconds: that it took.
+    """
     solver = session.solver
-    estimate = solver.estimates[-1]
-    if not estimate.comparisons:
+    estimate, parts = solver.estimates[-1], solver.estimates[-solver.parameters.parts_per_turn :]
+    points = [part.comparisons for part in parts]
+    if not any(points):
         return ScanUpdate(scan, None, True, belief, provisional=session.is_provisional)
     # What pose and velocity share is left out.
     covariance = block_diag(estimate.pose_covariance, estimate.velocity_covariance)
     times = np.linspace(min(scan.start, estimate.time - 1e-3), estimate.time, PATH_POINTS)
     result = MatchResult(
         status=MatchStatus.CONVERGED, belief=belief, velocity=estimate.velocity, covariance=covariance,
-        error=estimate.distance, points_used=estimate.comparisons, seconds=seconds, beam_times=times,
-        beam_poses=session.path(times),
+        error=float(np.average([part.distance for part in parts], weights=points)), points_used=sum(points),
+        seconds=seconds, beam_times=times, beam_poses=session.path(times),
     )  # fmt: skip
     loop = "" if solver.closed is None else solver.closed.line()
     return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=loop)

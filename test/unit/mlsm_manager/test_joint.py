@@ -40,7 +40,16 @@ def test_no_scan_is_rejected_and_those_with_neighbours_give_a_fix(run):
     _, updates = run
     assert all(update.accepted for update in updates)
     assert updates[0].result is None
-    assert updates[-1].result.points_used > 100
+    assert 100 < updates[-1].result.points_used <= len(SCANS[5])
+
+
+def test_a_scan_in_which_nothing_is_heard_is_no_fix():
+    localiser, _ = localiser_after(5)
+    scan = SCANS[5]
+    update = localiser.take_scan(scan.without_points(scan.reference_time)).scan
+    assert update.result is None
+    age = localiser.place_now(scan.reference_time, scan.reference_pose).age
+    assert age == pytest.approx(scan.reference_time - SCANS[4].reference_time)
 
 
 def test_the_map_has_all_points_of_all_scans(run):
