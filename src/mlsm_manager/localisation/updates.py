@@ -64,14 +64,14 @@ class ScanResult:
 
 def report_scan(health: Health, update: ScanUpdate, matching: bool) -> None:
     health.show("matching", "on" if matching else "off")
+    result = update.result
     if matching:
         health.show("map", _PROVISIONAL if update.provisional else "scans agree with each other")
-    result = update.result
+        health.show("match status", "no echo compared" if result is None else result.status.name)
     if result is None:
         health.count("scans placed by odometry")
         return
     health.count("scans matched" if update.accepted else "scans not matched")
-    health.show("match status", result.status.name)
     health.show("match error [m]", f"{result.error:.3f}")
     health.show("match points", f"{result.points_used} of {len(update.scan)}")
     health.show("match time [ms]", f"{1e3 * result.seconds:.1f}")
