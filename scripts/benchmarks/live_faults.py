@@ -8,6 +8,7 @@ how many seconds from the beginning of the fault, or of the run, anything was na
 
 import re
 from argparse import Namespace
+from bisect import bisect_right
 from typing import List, NamedTuple, Optional
 
 import numpy as np
@@ -46,8 +47,11 @@ def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
     localiser = parameters.build_localiser(recording.sonar_in_base)
     recording, _ = with_steady_head(recording)
     beams = recording.corrected(parameters.part(BeamCorrection))
-    found = []
+    found, heard, stamps = [], 0, [one.beam.stamp_ns * 1e-9 for one in beams.beams]
     for scan, _ in scans_of(beams, EchoExtractor(parameters.echoes())):
+        before, heard = heard, bisect_right(stamps, scan.reference_time)
+        for beam in beams.beams[before:heard]:
+            localiser.following.found.hear(beam)
         try:
             localiser.take_scan(scan)
         except RefusedInput:

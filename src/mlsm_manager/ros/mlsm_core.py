@@ -34,6 +34,7 @@ from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import report_broken, subscribe_to_clouds
 from sonar_processing.ros.pipeline import Pipeline
@@ -92,6 +93,10 @@ class MlsmCore:
     def insert(self, cloud: Cloud) -> None:
         """Insert a cloud; one that cannot be placed in the map is counted and left out."""
         guarded(self.health, self._insert)(cloud)
+
+    def hear(self, beam: PlacedBeam) -> None:
+        """Learn a beam, which shows what the head does."""
+        self._localiser.following.found.hear(beam)
 
     def match(self, cloud: Cloud) -> None:
         """Match a scan of echoes; one that cannot be matched is counted."""
@@ -281,7 +286,7 @@ class Mapping:
     def __init__(self) -> None:
         """Raises ParameterError for a bad parameter of any stage."""
         self._core = MlsmCore(rospy.resolve_name("mlsm_core"))
-        self._pipeline = Pipeline(CloudSink(self._core.insert), CloudSink(self._core.match))
+        self._pipeline = Pipeline(CloudSink(self._core.insert), CloudSink(self._core.match), self._core.hear)
         self._core.status.stages_before = self._pipeline.healths
         self.healths: List[Health] = [*self._pipeline.healths, *self._core.healths]
 

@@ -34,18 +34,33 @@ def of_trembling(degrees: float, is_mended: bool) -> Cause:
 
 def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
     """Return what the beams of a recording, in the order of their stamps, show."""
-    if len(beams) < 2:
-        return []
-    times = np.array([one.beam.stamp_ns for one in beams]) * 1e-9
-    angles = np.array([one.beam.angle for one in beams])
-    stands = _standing(times, angles)
-    if stands:
-        return stands
-    hears = np.array([bool(one.beam.intensities.any()) for one in beams])
-    found = [_stuck(times, beams), _blind(angles, hears), _doubled(beams)]
-    heard = [one for one, hears_any in zip(beams, hears) if hears_any]
-    found += [_changed(times[hears], heard, measure, text) for text, measure in _MEASURES]
-    return [cause for cause in found if cause is not None]
+    heard = [one for one in beams if one.beam.intensities.any()]
+    changed = (_changed(_times(heard), heard, measure, text) for text, measure in _MEASURES)
+    return _standing(beams) or [*head_causes(beams)[0], *(cause for cause in changed if cause is not None)]
+
+
+def head_causes(beams: Sequence[PlacedBeam], usual: float = 0.0) -> Tuple[List[Cause], float]:
+    """Return what is wrong with the head that some minutes of beams show as well as a whole recording.
+
+    The second value is how different beams of other directions are: 0 equal, 1 nothing in common; at least `usual`,
+    which those before had.
+    """
+    differences = _differences(beams)
+    told = differences[np.isfinite(differences)]
+    if len(told) >= 2 * _apart(beams):
+        usual = max(usual, float(np.median(told)))
+    found = (_stuck(beams, differences, usual), _blind(beams), _doubled(beams))
+    return _standing(beams) or [cause for cause in found if cause is not None], usual
+
+
+def _times(beams: Sequence[PlacedBeam]) -> np.ndarray:
+    """Return when beams (n,) were sent, s."""
+    return np.array([one.beam.stamp_ns for one in beams]) * 1e-9
+
+
+def _angles(beams: Sequence[PlacedBeam]) -> np.ndarray:
+    """Return where the head pointed, (n,) rad."""
+    return np.array([one.beam.angle for one in beams])
 
 
 def ranges_are_told(beams: Sequence[PlacedBeam]) -> bool:
@@ -55,10 +70,10 @@ def ranges_are_told(beams: Sequence[PlacedBeam]) -> bool:
     return bool(longest > _CHANGED * shortest)
 
 
-def _standing(times: np.ndarray, angles: np.ndarray) -> List[Cause]:
+def _standing(beams: Sequence[PlacedBeam]) -> List[Cause]:
     """Return stretches in which the head reports one angle, unless it never turns."""
-    still = np.abs(np.angle(np.exp(1j * np.diff(angles)))) < _STILL
-    if still.mean() > 0.9:
+    times, still = _times(beams), np.abs(np.angle(np.exp(1j * np.diff(_angles(beams))))) < _STILL
+    if not len(still) or still.mean() > 0.9:
         return []
     found = [(float(times[first]), float(times[last] - times[first])) for first, last in stretches(still)]
     return [
@@ -72,16 +87,13 @@ def _gone(seconds: float) -> float:
     return _SPEED * float(np.sqrt(seconds * _STANDS)) / 2.0
 
 
-def _stuck(times: np.ndarray, beams: Sequence[PlacedBeam]) -> Optional[Cause]:
+def _stuck(beams: Sequence[PlacedBeam], differences: np.ndarray, usual: float) -> Optional[Cause]:
     """Return when all directions began to hear the same, though the head reports that it turns."""
-    apart = max(len(beams) // 400, 10)
-    strengths = [one.beam.intensities.astype(np.float32) for one in beams]
-    values = np.array([_difference(one, other) for one, other in zip(strengths[:-apart], strengths[apart:])])
-    told = np.isfinite(values)
-    if np.count_nonzero(told) < 2 * apart or np.median(values[told]) < 2.0 * _ALIKE:
+    times, apart, told = _times(beams), _apart(beams), np.isfinite(differences)
+    if len(differences) < 2 * apart or usual < 2.0 * _ALIKE:
         return None
     near = np.ones(6 * apart + 1) / (6 * apart + 1)
-    share = np.convolve(np.where(told, values, np.inf) < _ALIKE, near, "same")
+    share = np.convolve(np.where(told, differences, np.inf) < _ALIKE, near, "same")
     alike = stretches(share > _MOSTLY)
     if not alike:
         return None
@@ -93,6 +105,17 @@ def _stuck(times: np.ndarray, beams: Sequence[PlacedBeam]) -> Optional[Cause]:
     return Cause(text, _CERTAIN, float(times[first]), metres=_gone(seconds))
 
 
+def _apart(beams: Sequence[PlacedBeam]) -> int:
+    """Return how many beams after another one the head usually looks elsewhere."""
+    return max(len(beams) // 400, 10)
+
+
+def _differences(beams: Sequence[PlacedBeam]) -> np.ndarray:
+    """Return how different beams are from those some directions on; NaN where both are silent."""
+    strengths = [one.beam.intensities.astype(np.float32) for one in beams]
+    return np.array([_difference(*pair) for pair in zip(strengths, strengths[_apart(beams) :])])
+
+
 def _difference(one: np.ndarray, other: np.ndarray) -> float:
     """Return how different the strengths of two beams are: 0 equal, 1 nothing in common; NaN where both are silent."""
     if len(one) != len(other):
@@ -101,9 +124,10 @@ def _difference(one: np.ndarray, other: np.ndarray) -> float:
     return float(np.abs(one - other).sum()) / total if total else np.nan
 
 
-def _blind(angles: np.ndarray, hears: np.ndarray) -> Optional[Cause]:
+def _blind(beams: Sequence[PlacedBeam]) -> Optional[Cause]:
     """Return whether about half of the circle hears nothing, though the head looks there."""
-    sector = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
+    hears = np.array([bool(one.beam.intensities.any()) for one in beams])
+    sector = ((_angles(beams) % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
     looked = np.bincount(sector, minlength=_SECTORS)
     if looked.min() < 10:
         return None

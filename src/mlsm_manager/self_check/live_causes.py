@@ -12,6 +12,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
+from mlsm_manager.self_check.beam_causes import head_causes
 from mlsm_manager.self_check.causes import Cause, Fault, Suspicion, is_alike, of_steps, of_stuck, ranked, widened
 from mlsm_manager.self_check.course import NOT_TOLD, CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
@@ -19,6 +20,7 @@ from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.standing import standing_causes
 from node_support.geometry import composed, move_of
+from sonar_processing.beams.beam import PlacedBeam
 
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
@@ -26,10 +28,11 @@ _AT_ONCE = 10.0
 """Nats from which on one look is enough. Weaker causes must be found by two in a row: each scan is another chance for a
 wrong one."""
 _MOST_PLACES = 20000  # four days of scans of 16 s
+_MOST_BEAMS = 20000  # of the newest scans: 30 of a head that takes 400 steps a turn are 12000
 
 
 class LiveCauses:
-    """Safe to use from several threads: one gives it scans, another looks at them."""
+    """Safe to use from several threads: one gives it scans and beams, another looks at them."""
 
     def __init__(self) -> None:
         self.sonar_in_base = np.zeros(2)
@@ -41,6 +44,8 @@ class LiveCauses:
             self._scans: Deque[Scan] = deque(maxlen=_NEWEST)
             self._places: Deque[Tuple[float, float, float]] = deque(maxlen=_MOST_PLACES)
             self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
+            self._beams: Deque[PlacedBeam] = deque(maxlen=_MOST_BEAMS)
+            self._usual_difference = 0.0
             self._is_new = False
             self._found: List[Cause] = []
             self._shown: List[Cause] = []
@@ -55,6 +60,11 @@ class LiveCauses:
             self._places.append((scan.reference_time, float(pose[0]), float(pose[1])))
             self._is_new = True
 
+    def hear(self, beam: PlacedBeam) -> None:
+        """Learn a beam, as the head reports it."""
+        with self._lock:
+            self._beams.append(beam)
+
     def look(
         self, newest_run: Callable[[], Optional[Solution]] = lambda: None, steps: Sequence[Step] = ()
     ) -> None:  # fmt: skip
@@ -67,12 +77,16 @@ class LiveCauses:
             if not self._is_new or len(self._scans) < _FEWEST:
                 return
             self._is_new, scans, places = False, list(self._scans), self._places
+            while self._beams and self._beams[0].beam.stamp_ns * 1e-9 < scans[0].start:
+                self._beams.popleft()
+            beams = list(self._beams)
             begin = np.array(places[0][1:])
             corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
         track = joined([scan.track for scan in scans])
         of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
         path = composed(corrections.at(track.times), track.poses)
-        of_beams, spread, by_mounts = standing_causes(scans, track, path), np.zeros((2, 2)), 0.0
+        of_beams = [*self._of_head(beams), *standing_causes(scans, track, path)]
+        spread, by_mounts = np.zeros((2, 2)), 0.0
         course = self._course
         found = [*of_echoes, *of_beams]
         run = newest_run()
@@ -89,6 +103,11 @@ class LiveCauses:
             if self._places is places:
                 self._learn(found, spread, by_mounts, scans[0].start)
                 self._course = course
+
+    def _of_head(self, beams: Sequence[PlacedBeam]) -> List[Cause]:
+        """Return what the newest beams show; one that stood all the time is told from how it was before."""
+        found, self._usual_difference = head_causes(beams, self._usual_difference)
+        return found
 
     def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
         """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after.

@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from functools import partial
-from typing import TYPE_CHECKING, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import TYPE_CHECKING, Callable, Collection, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
@@ -15,6 +15,7 @@ from node_support.parameters import ParameterError, ParameterSet
 from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, kept_by_master
+from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
 from sonar_processing.ros.cloud_topics import (
@@ -127,8 +128,13 @@ class Pipeline:
     detectors do, only while somebody subscribes to their results.
     """
 
-    def __init__(self, cloud_sink: Optional[CloudSink] = None, echo_sink: Optional[CloudSink] = None) -> None:
+    def __init__(
+        self, cloud_sink: Optional[CloudSink] = None, echo_sink: Optional[CloudSink] = None,
+        beam_sink: Callable[[PlacedBeam], None] = lambda _: None,
+    ) -> None:  # fmt: skip
         """`cloud_sink` receives what leaves the last stage of clouds, `echo_sink` the last of polar scans.
+
+        `beam_sink` receives each beam.
 
         Raises ParameterError for a bad parameter of any stage or detector.
         """
@@ -145,6 +151,7 @@ class Pipeline:
             rospy.resolve_name("sonar_to_cloud"),
             CloudSink(clouds.process, clouds.is_wanted),
             CloudSink(polar.process, polar.is_wanted),
+            beam_sink,
         )
         self._image = SonarImage(rospy.resolve_name("sonar_image"))
         hosted = [self._source, *runners, *detectors, self._image]

@@ -61,15 +61,16 @@ class SonarToCloud:
     """Subscribes to beams, publishes scans and hands them on where stages share the process."""
 
     def __init__(
-        self, namespace: str = "~", scan_sink: Optional[CloudSink] = None, polar_sink: Optional[CloudSink] = None
-    ) -> None:
-        """`scan_sink` takes scans, `polar_sink` organised clouds of whole revolutions.
+        self, namespace: str = "~", scan_sink: Optional[CloudSink] = None, polar_sink: Optional[CloudSink] = None,
+        beam_sink: Callable[[PlacedBeam], None] = lambda _: None,
+    ) -> None:  # fmt: skip
+        """`scan_sink` takes scans, `polar_sink` organised clouds of whole revolutions, `beam_sink` each beam.
 
         Raises ParameterError for a bad parameter in `namespace`.
         """
         self.health = make_health("sonar_to_cloud")
         self.healths = [self.health]
-        self._scan_sink = scan_sink
+        self._scan_sink, self._beam_sink = scan_sink, beam_sink
         self._moving_state = MovingState()
         self._revolution = RevolutionCollector()
         self._head = HeadWatch()
@@ -119,6 +120,7 @@ class SonarToCloud:
             scan = self._assembler.add(placed)
             revolution = self._revolution.add(placed)
         self.health.count("beams placed")
+        self._beam_sink(placed)
         if scan is not None:
             self._publish(scan)
         if revolution is not None:

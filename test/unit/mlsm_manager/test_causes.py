@@ -17,7 +17,7 @@ from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.bag_mapping import with_steady_head
-from mlsm_manager.self_check.beam_causes import beam_causes
+from mlsm_manager.self_check.beam_causes import beam_causes, head_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.course import CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
@@ -160,6 +160,24 @@ def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(
     assert (np.trace(live.covariance([])) > 0.25) == bool(said)
     live.clear()
     assert live.causes([]) == []
+
+
+def test_a_run_that_goes_on_names_a_head_that_stands_though_it_reports_that_it_turns():
+    live, stood = LiveCauses(), broken.head_stops(WHOLE, MIDDLE, np.inf, tells=False)
+    for scan in scans_in(stood):
+        live.take(scan, scan.reference_pose)
+    for beam in stood.beams:
+        live.hear(beam)
+    live.look()
+    assert live.causes([])[0].text.startswith("the head stood for ")
+
+
+def test_a_head_that_stands_for_all_of_the_newest_beams_is_known_by_those_before():
+    before = head_causes(WHOLE.beams)
+    standing = shortened(broken.head_stops(WHOLE, 0.0, np.inf, tells=False), 100.0).beams
+    assert before[0] == head_causes(standing)[0] == []
+    (cause,) = head_causes(standing, usual=before[1])[0]
+    assert cause.text.startswith("the head stood for 9")
 
 
 def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
