@@ -1,0 +1,43 @@
+#!/usr/bin/env python3
+"""A head that stands though it reports that it turns is named while the vehicle goes on."""
+
+import unittest
+from contextlib import ExitStack
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import rosbag
+from graph import TEST_DATA, Diagnostics, launched, run, wait_until
+
+STANDS_FROM = 110.0  # s, of a bag of 160
+BEAMS = "/sonar/raw"
+
+
+class StandingHead(unittest.TestCase):
+    """Plays a tour of the basin in which all beams from a moment on hear the same."""
+
+    def test_mlsm_core_names_it(self) -> None:
+        diagnostics = Diagnostics()
+        with ExitStack() as playback:
+            bag = Path(playback.enter_context(TemporaryDirectory())) / "standing.bag"
+            with_standing_head(TEST_DATA / "basin.bag", bag)
+            arguments = f"bag:={bag}", "rate:=10", "shapes:=false", "rviz:=false"
+            playback.enter_context(launched("play_bag.launch", *arguments))
+            wait_until(lambda: "the head stood for " in diagnostics.values("mlsm_core").get("causes", ""), 120.0)
+
+
+def with_standing_head(source: Path, copy: Path) -> None:
+    """Write a copy of a bag whose beams hear from STANDS_FROM on what the one before heard."""
+    with rosbag.Bag(str(source)) as bag, rosbag.Bag(str(copy), "w") as broken:
+        heard = b""
+        for topic, message, time in bag.read_messages():
+            if topic == BEAMS and time.to_sec() - bag.get_start_time() > STANDS_FROM:
+                message.intensities = heard
+            elif topic == BEAMS:
+                heard = message.intensities
+            broken.write(topic, message, time)
+
+
+if __name__ == "__main__":
+    # rospy's own time follows the recording, and does not begin without one.
+    run(StandingHead, disable_rostime=True)
