@@ -101,8 +101,7 @@ def position_state(
 
 
 def _clause(cause: Cause, time: float) -> str:
-    text = cause.text.rstrip(",")
-    return text if np.isnan(cause.begin) else f"{text} {time - cause.begin:.0f} s ago"
+    return cause.text.rstrip(",") if np.isnan(cause.begin) else f"{cause.text} {time - cause.begin:.0f} s ago"
 
 
 def report_place(health: Health, place: PlaceNow) -> None:

@@ -272,6 +272,7 @@ SMEARED = Verdict("scans on the map", 0.2, 0.5, "scans beside the map", more_is_
     [
         (0.0, [], [], {}, []),
         (0.0, [JUMP], [], {}, ["odometry jumped by 30.0 m 12 s ago"]),
+        (0.0, [Cause("the head stood for 29 s,", 500.0, 88.0)], [], {}, ["the head stood for 29 s, 12 s ago"]),
         (0.0, [replace(JUMP, begin=20.0)], [], {}, []),
         (0.0, [TURNED], [SMEARED], {}, [TURNED.text, SMEARED.text]),
         (3.0, [TURNED], [], {}, ["no fix for 30 s", TURNED.text]),
