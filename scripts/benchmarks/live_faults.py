@@ -8,7 +8,6 @@ how many seconds from the beginning of the fault, or of the run, anything was na
 
 import re
 from argparse import Namespace
-from bisect import bisect_right
 from typing import List, NamedTuple, Optional
 
 import numpy as np
@@ -47,9 +46,9 @@ def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
     localiser = parameters.build_localiser(recording.sonar_in_base)
     recording, _ = with_steady_head(recording)
     beams = recording.corrected(parameters.part(BeamCorrection))
-    found, heard, stamps = [], 0, [one.beam.stamp_ns * 1e-9 for one in beams.beams]
+    found, heard = [], 0
     for scan, _ in scans_of(beams, EchoExtractor(parameters.echoes())):
-        before, heard = heard, bisect_right(stamps, scan.reference_time)
+        before, heard = heard, int(np.searchsorted(beams.times, scan.reference_time, side="right"))
         for beam in beams.beams[before:heard]:
             localiser.following.found.hear(beam)
         try:

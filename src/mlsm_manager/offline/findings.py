@@ -124,11 +124,11 @@ class _BestPath(NamedTuple):
     mounts: float = 0.0
 
     def to_the_end(self, end: Optional[PlaceNow], newest: np.ndarray) -> "_BestPath":
-        """Return it with its last place too, where scans ended at least two turns of the head before the odometry.
+        """Return it with its last place too, where fixes ended long before.
 
-        end: how well that place is known. newest: (2, 2) m^2, how well the place of the last scan was.
+        end: see Replayed.at_end. newest: (2, 2) m^2, how well the place of the last scan was known.
         """
-        if end is None or end.overdue <= 0.0:
+        if end is None:
             return self
         covariance = self.covariances[-1] + end.covariance[POSITION, POSITION] - newest
         return self._replace(
@@ -139,8 +139,11 @@ class _BestPath(NamedTuple):
         )
 
     def cause_of_end(self, end: Optional[PlaceNow]) -> List[Cause]:
-        """Return when the last fix came, where the position is lost since; `end` is how well the last one is known."""
-        if end is None or end.overdue <= 0.0:
+        """Return a cause that tells when the last fix came, if the position has been lost since; else none.
+
+        end: see Replayed.at_end.
+        """
+        if end is None:
             return []
         begin, deviations = end.time - end.age, radii(self.covariances)
         grown = np.sqrt(max(deviations[-1] ** 2 - np.interp(begin, self.times, deviations) ** 2, 0.0))

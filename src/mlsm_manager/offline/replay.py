@@ -134,7 +134,8 @@ class Replayed:
 
     times: (m,) s of the odometry. odometry, corrected: (m, 3) T_odom_base and T_map_base, the second as it was known
     at each moment. updates: of all scans that were taken, oldest first. refused: how many were not, by the reason.
-    seconds: of a core for each scan. at_end: how well the place is known at the last of the times; None without a fix.
+    seconds: of a core for each scan. at_end: how well the place is known at the last of the times, where fixes ended
+    two turns of the head or more before; else None.
     strafing: the run of a vehicle that strafes, which the scans may be as well; None where they tell that it does not,
     or nobody asked.
     """
@@ -226,7 +227,8 @@ def replay(
         on_scans(1)
     corrections[done:] = _corrections(localiser, track, done, len(track.times))
     corrected = composed(corrections, track.poses)
-    at_end = localiser.place_now(float(track.times[-1]), track.poses[-1])
+    last = localiser.place_now(float(track.times[-1]), track.poses[-1])
+    at_end = last if last is not None and last.overdue > 0.0 else None
     return Replayed(track.times, track.poses, corrected, localiser.estimator, updates, refused, seconds, at_end)
 
 

@@ -40,10 +40,10 @@ def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
 
 
 def head_causes(beams: Sequence[PlacedBeam], usual: float = 0.0) -> Tuple[List[Cause], float]:
-    """Return what is wrong with the head that some minutes of beams show as well as a whole recording.
+    """Return what is wrong with the head, as far as a few minutes of beams show it.
 
-    The second value is how different beams of other directions are: 0 equal, 1 nothing in common; at least `usual`,
-    which those before had.
+    The second value tells how different beams of two directions usually are: 0 equal, 1 nothing in common. It is never
+    less than `usual`, which is that of earlier beams.
     """
     differences = _differences(beams)
     told = differences[np.isfinite(differences)]

@@ -165,9 +165,10 @@ def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[
 
 
 def _rounds(best: _Trial) -> int:
-    """Return how often sizes beside that of a trial are tried; none for a sonar's that makes the run less likely.
+    """Return how many rounds of other sizes are tried: none for a fault of the sonar that makes the run less likely.
 
-    Each round takes seconds. In 41 broken recordings all that were named made it likelier from the first.
+    Each round takes seconds. All faults that were named in 41 broken recordings made the run likelier in the first
+    trial.
     """
     if not isinstance(best.fault, SonarFault):
         return 1

@@ -105,7 +105,7 @@ class LiveCauses:
                 self._course = course
 
     def _of_head(self, beams: Sequence[PlacedBeam]) -> List[Cause]:
-        """Return what the newest beams show; one that stood all the time is told from how it was before."""
+        """Return what the newest beams show; if the head stands in all of them, earlier ones tell that it turned."""
         found, self._usual_difference = head_causes(beams, self._usual_difference)
         return found
 
