@@ -49,7 +49,7 @@ def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
     found, heard = [], 0
     for scan, _ in scans_of(beams, EchoExtractor(parameters.echoes())):
         before, heard = heard, int(np.searchsorted(beams.times, scan.reference_time, side="right"))
-        for beam in beams.beams[before:heard]:
+        for beam in beams.sent[before:heard]:
             localiser.following.found.hear(beam)
         try:
             localiser.take_scan(scan)

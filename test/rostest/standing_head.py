@@ -16,12 +16,18 @@ BEAMS = "/sonar/raw"
 class StandingHead(unittest.TestCase):
     """Plays a tour of the basin in which all beams from a moment on hear the same."""
 
-    def test_mlsm_core_names_it(self) -> None:
+    def test_mlsm_core_names_it_in_the_process_that_has_the_beams(self) -> None:
+        self.assert_named("one")
+
+    def test_mlsm_core_names_it_as_a_node_of_its_own(self) -> None:
+        self.assert_named("many")
+
+    def assert_named(self, processes: str) -> None:
         diagnostics = Diagnostics()
         with ExitStack() as playback:
             bag = Path(playback.enter_context(TemporaryDirectory())) / "standing.bag"
             with_standing_head(TEST_DATA / "basin.bag", bag)
-            arguments = f"bag:={bag}", "rate:=10", "shapes:=false", "rviz:=false"
+            arguments = f"bag:={bag}", f"processes:={processes}", "rate:=10", "shapes:=false", "rviz:=false"
             playback.enter_context(launched("play_bag.launch", *arguments))
             wait_until(lambda: "the head stood for " in diagnostics.values("mlsm_core").get("causes", ""), 120.0)
 

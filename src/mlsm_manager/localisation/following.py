@@ -181,7 +181,10 @@ class Following:
         return track if self.resumed_at is None else self.resumed_at.bridged(track)
 
     def taken(self, scan: Scan) -> Scan:
-        """Learn a scan's odometry, and return the scan with one that goes on, which does not tremble."""
+        """Learn a scan's odometry, and return the scan with one that goes on, which does not tremble.
+
+        Echoes of a head that stood untold are left out: they lie on an arc that nothing in the water has.
+        """
         odometry, (smooth, trembling) = self.odometry, with_trembling_smoothed(scan.track)
         self._came = scan.reference_time, self._clock()
         if trembling:
@@ -189,12 +192,14 @@ class Following:
             moves = move_of(scan.track.at(scan.times), smooth.at(scan.times))
             scan = replace(scan, points=transformed(moves, scan.points), track=smooth)
         odometry.take(scan.track)
+        scan = scan.chosen(self.found.turned_as_told(scan.times))
         if not odometry.steps:
             return scan
         return replace(scan, points=self._moved(scan.points, scan.times), track=odometry.followed(scan.track))
 
     def cloud(self, cloud: MapCloud) -> MapCloud:
-        """Return a cloud of which the odometry is known where an odometry that goes on puts it."""
+        """Return a cloud of which the odometry is known where an odometry that goes on puts it; see `taken`."""
+        cloud = cloud.chosen(self.found.turned_as_told(cloud.times))
         return replace(cloud, points=self._moved(cloud.points, cloud.times)) if self.odometry.steps else cloud
 
     def _moved(self, points: np.ndarray, times: np.ndarray) -> np.ndarray:

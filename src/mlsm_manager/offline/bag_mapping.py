@@ -53,6 +53,7 @@ from mlsm_manager.self_check.fault_trials import with_other_ranges
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
+from mlsm_manager.self_check.standing_head import head_stood, of_standing
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from recordings.motion.vehicle_motion import MotionSource
@@ -97,8 +98,9 @@ def mapped_bag(recording: Recording, options: Namespace) -> MappedBag:
     """Map `recording`, and the bags after the first, as the command line says. Raises RecordingError and OSError."""
     recording, causes = with_odometry_mended(recording, options.parameters.part(MotionLimits))
     recording, trembling = with_steady_head(recording)
+    recording, standing = with_turning_head(recording)
     recording = recording.corrected(options.parameters.part(BeamCorrection))
-    return _mapped(recording, [*causes, *trembling], _odometry(recording, options), options)
+    return _mapped(recording, [*causes, *trembling, *standing], _odometry(recording, options), options)
 
 
 def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, options: Namespace) -> MappedBag:
@@ -122,7 +124,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
         known = odometry._replace(put_right=assumed)
         return _mapped(recording.with_track(track), [*causes, *heard.mounted, cause], known, options)
     of_echoes = [*heard.mounted, *found.causes]
-    of_beams = [*beam_causes(recording.beams), *standing_causes(heard.scans, recording.track, replayed.corrected)]
+    of_beams = [*beam_causes(recording.sent), *standing_causes(heard.scans, recording.track, replayed.corrected)]
     refined = _refined(replayed, recording, parameters, found.suspected, [*of_echoes, *of_beams], options)
     runs = _runs(replayed, refined)
     if found.mount == AS_TOLD and _positions_mislead(recording, heard.scans, extracting, odometry, runs, options):
@@ -143,7 +145,7 @@ def _refined(
         return None
     suspected = [*suspected, *(cause.fault for cause in causes if cause.fault is not None)]
     with _bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
-        suspicion = Suspicion(suspected, ranges_are_told(recording.beams))
+        suspicion = Suspicion(suspected, ranges_are_told(recording.sent))
         return refine(replayed, recording.track, parameters.map_settings(), suspicion, bar.update)
 
 
@@ -195,7 +197,7 @@ def _followed(
     changed = with_odometry(extracting, other.kind, options.fixed)
     again = _replayed(recording, scans, changed)
     ranges = []
-    if not ranges_are_told(recording.beams):
+    if not ranges_are_told(recording.sent):
         suspected = echo_findings(scans, recording.sonar_in_base, replayed.corrections).suspected
         ranges = with_other_ranges(replayed.solver.solution, recording.track, suspected)
     if again.solver is not None and strafes(replayed.solver, again.solver, ranges):
@@ -362,11 +364,19 @@ def _run(
 
 def with_steady_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
     """Return a recording whose head's angles do not tremble, and what was wrong with it."""
-    found = steadied([placed.beam for placed in recording.beams])
+    found = steadied(recording.sent)
     if found is None:
         return recording, []
     beams = [replace(placed, beam=beam) for placed, beam in zip(recording.beams, found.beams)]
     return replace(recording, beams=beams), [of_trembling(np.degrees(found.deviation), found.share > _MOSTLY)]
+
+
+def with_turning_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
+    """Return a recording without what a head that stood heard, and what was wrong with it."""
+    stood, _ = head_stood(recording.sent)
+    for one in stood:
+        recording = recording.without_beams(one.begin, one.end)
+    return recording, of_standing(stood)
 
 
 def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:

@@ -15,7 +15,7 @@ from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
 from recordings.motion.frame_tree import FrameTree
 from recordings.reader import Request, read
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import FEWEST_BEAMS, EchoExtractor
@@ -102,9 +102,14 @@ class Recording:
         return self._moved(matrices(poses) @ move @ matrices(inverse(poses)))
 
     @property
+    def sent(self) -> List[Beam]:
+        """The beams without where they are placed."""
+        return [placed.beam for placed in self.beams]
+
+    @property
     def times(self) -> np.ndarray:
         """(n,) s, when the beams left."""
-        return np.array([placed.beam.stamp_ns for placed in self.beams]) * 1e-9
+        return np.array([beam.stamp_ns for beam in self.sent]) * 1e-9
 
     @property
     def sonar_in_base(self) -> np.ndarray:

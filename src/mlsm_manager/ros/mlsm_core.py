@@ -34,10 +34,12 @@ from node_support.health import Health
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, read_parameters
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import Cloud, CloudSink
+from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.cloud_topics import report_broken, subscribe_to_clouds
 from sonar_processing.ros.pipeline import Pipeline
+from sonar_processing.scans.parameters import SonarToCloudParameters
 
 _Z_DOWN_ADVICE = (
     "if the odometry counts north, east, down, publish x, y left, z up instead (play_bag: ned:=true); "
@@ -84,8 +86,10 @@ class MlsmCore:
 
     @classmethod
     def as_node(cls) -> "MlsmCore":
-        """Return the map as a node of its own, which takes clouds and echoes from their topics."""
+        """Return the map as a node of its own, which takes beams, clouds and echoes from their topics."""
         core = cls()
+        of_beams = read_parameters(SonarToCloudParameters, rospy.resolve_name("sonar_to_cloud"))
+        BeamSubscriber(core.hear, of_beams, core.health)
         subscribe_to_clouds(topics.CLEANED, core.insert, core.health)
         subscribe_to_clouds(topics.ECHOES, core.match, core.health)
         return core
@@ -94,7 +98,7 @@ class MlsmCore:
         """Insert a cloud; one that cannot be placed in the map is counted and left out."""
         guarded(self.health, self._insert)(cloud)
 
-    def hear(self, beam: PlacedBeam) -> None:
+    def hear(self, beam: Beam) -> None:
         """Learn a beam, which shows what the head does."""
         self._localiser.following.found.hear(beam)
 

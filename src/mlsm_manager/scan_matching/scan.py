@@ -110,10 +110,13 @@ class Scan:
 
     def with_odometry(self) -> "Scan":
         """Return it without the points from before its track begins: where they were heard is not known."""
-        known = self.times >= self.track.times[0]
-        if known.all():
+        return self.chosen(self.times >= self.track.times[0])
+
+    def chosen(self, kept: np.ndarray) -> "Scan":
+        """Return it with those of its points that are kept (n,)."""
+        if kept.all():
             return self
-        return Scan(self.points[known], self.times[known], self.moving[known], self.track, self.reference_time)
+        return Scan(self.points[kept], self.times[kept], self.moving[kept], self.track, self.reference_time)
 
     def without_points(self, end: float) -> "Scan":
         """Return a scan that ends at `end` [s] and heard nothing, with the same odometry."""
@@ -153,6 +156,10 @@ class MapCloud:
     @classmethod
     def of_scan(cls, scan: Scan) -> "MapCloud":
         return cls(scan.points, scan.times, scan.reference_time)
+
+    def chosen(self, kept: np.ndarray) -> "MapCloud":
+        """Return it with those of its points that are kept (n,)."""
+        return self if kept.all() else MapCloud(self.points[kept], self.times[kept], self.end)
 
     @classmethod
     def joined(cls, clouds: "Sequence[MapCloud]") -> "MapCloud":

@@ -1,4 +1,4 @@
-"""Causes that beams show by themselves: a head that stands, a blind side, and settings that changed in mid-run."""
+"""Causes that beams of a head that turns show by themselves: a blind side, and settings that changed in mid-run."""
 
 from typing import Callable, List, Optional, Sequence, Tuple
 
@@ -7,12 +7,9 @@ import numpy as np
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.self_check.causes import Cause
 from node_support.timing import stretches
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import Beam
 
 _CERTAIN = 500.0  # nats: of what needs no comparison of scans to be seen
-_STANDS = 20.0  # s: longer than any head waits between two beams, about a turn
-_STILL = 1e-3  # rad: heads step by ten times as much
-_ALIKE = 0.25  # of the difference of strengths to their sum: beams of one direction have less, of others three times it
 _MOSTLY = 0.5  # share of the beams of some seconds that are alike; where the vehicle turns they shift by bins
 _SECTORS, _BLIND = 36, 15  # of the circle; so many beside each other, 150 degrees, hear nothing while the others do
 _HEARS, _DEAF = 0.3, 0.02  # shares of the beams of a sector that hear something
@@ -24,7 +21,6 @@ _USUAL = [0.05, 0.95]  # shares of the beams that have shorter ranges: a few may
 _SAMPLE = 400  # beams that tell whether echoes come twice
 _RATIOS = np.array([2.0, 1.5, 1.6, 1.7, 1.8, 1.9, 2.1, 2.2, 2.3, 2.5])  # of ranges: twice, and others by chance
 _NEAREST = 1.0 / 3.0  # of the range, from which on echoes are compared with those nearer
-_SPEED = 0.3  # m/s: the usual speed of a small vehicle, which nothing corrects while the head stands
 
 
 def of_trembling(degrees: float, is_mended: bool) -> Cause:
@@ -32,102 +28,30 @@ def of_trembling(degrees: float, is_mended: bool) -> Cause:
     return Cause(f"the head's angles tremble by {degrees:.0f} deg", _CERTAIN, is_mended=is_mended, metres=0.5)
 
 
-def beam_causes(beams: Sequence[PlacedBeam]) -> List[Cause]:
-    """Return what the beams of a recording, in the order of their stamps, show."""
-    heard = [one for one in beams if one.beam.intensities.any()]
-    changed = (_changed(_times(heard), heard, measure, text) for text, measure in _MEASURES)
-    return _standing(beams) or [*head_causes(beams)[0], *(cause for cause in changed if cause is not None)]
+def beam_causes(beams: Sequence[Beam]) -> List[Cause]:
+    """Return what the beams of a recording, in the order of their stamps, show, while their head turns."""
+    heard = [beam for beam in beams if beam.intensities.any()]
+    changed = (_changed(heard, measure, text) for text, measure in _MEASURES)
+    return [*head_causes(beams), *(cause for cause in changed if cause is not None)]
 
 
-def head_causes(beams: Sequence[PlacedBeam], usual: float = 0.0) -> Tuple[List[Cause], float]:
-    """Return what is wrong with the head, as far as a few minutes of beams show it.
-
-    The second value tells how different beams of two directions usually are: 0 equal, 1 nothing in common. It is never
-    less than `usual`, which is that of earlier beams.
-    """
-    differences = _differences(beams)
-    told = differences[np.isfinite(differences)]
-    if len(told) >= 2 * _apart(beams):
-        usual = max(usual, float(np.median(told)))
-    found = (_stuck(beams, differences, usual), _blind(beams), _doubled(beams))
-    return _standing(beams) or [cause for cause in found if cause is not None], usual
+def head_causes(beams: Sequence[Beam]) -> List[Cause]:
+    """Return what is wrong with the head or its window, as far as a few minutes of beams show it."""
+    return [cause for cause in (_blind(beams), _doubled(beams)) if cause is not None]
 
 
-def _times(beams: Sequence[PlacedBeam]) -> np.ndarray:
-    """Return when beams (n,) were sent, s."""
-    return np.array([one.beam.stamp_ns for one in beams]) * 1e-9
-
-
-def _angles(beams: Sequence[PlacedBeam]) -> np.ndarray:
-    """Return where the head pointed, (n,) rad."""
-    return np.array([one.beam.angle for one in beams])
-
-
-def ranges_are_told(beams: Sequence[PlacedBeam]) -> bool:
+def ranges_are_told(beams: Sequence[Beam]) -> bool:
     """Return whether messages tell that the range setting changed: then none changed untold."""
-    ranges = [one.beam.range_resolution * len(one.beam.intensities) for one in beams if len(one.beam.intensities)]
+    ranges = [beam.range_resolution * len(beam.intensities) for beam in beams if len(beam.intensities)]
     shortest, longest = np.quantile(ranges, _USUAL) if ranges else (0.0, 0.0)
     return bool(longest > _CHANGED * shortest)
 
 
-def _standing(beams: Sequence[PlacedBeam]) -> List[Cause]:
-    """Return stretches in which the head reports one angle, unless it never turns."""
-    times, still = _times(beams), np.abs(np.angle(np.exp(1j * np.diff(_angles(beams))))) < _STILL
-    if not len(still) or still.mean() > 0.9:
-        return []
-    found = [(float(times[first]), float(times[last] - times[first])) for first, last in stretches(still)]
-    return [
-        Cause(f"the head stood for {seconds:.0f} s,", _CERTAIN, begin, metres=_gone(seconds))
-        for begin, seconds in found
-        if seconds > _STANDS
-    ]
-
-
-def _gone(seconds: float) -> float:
-    return _SPEED * float(np.sqrt(seconds * _STANDS)) / 2.0
-
-
-def _stuck(beams: Sequence[PlacedBeam], differences: np.ndarray, usual: float) -> Optional[Cause]:
-    """Return when all directions began to hear the same, though the head reports that it turns."""
-    times, apart, told = _times(beams), _apart(beams), np.isfinite(differences)
-    if len(differences) < 2 * apart or usual < 2.0 * _ALIKE:
-        return None
-    near = np.ones(6 * apart + 1) / (6 * apart + 1)
-    share = np.convolve(np.where(told, differences, np.inf) < _ALIKE, near, "same")
-    alike = stretches(share > _MOSTLY)
-    if not alike:
-        return None
-    first, last = max(alike, key=lambda one: times[one[1]] - times[one[0]])
-    seconds = float(times[last] - times[first])
-    if seconds < _STANDS / 2.0:
-        return None
-    text = f"the head stood for {seconds:.0f} s though it reported that it turns,"
-    return Cause(text, _CERTAIN, float(times[first]), metres=_gone(seconds))
-
-
-def _apart(beams: Sequence[PlacedBeam]) -> int:
-    """Return how many beams after another one the head usually looks elsewhere."""
-    return max(len(beams) // 400, 10)
-
-
-def _differences(beams: Sequence[PlacedBeam]) -> np.ndarray:
-    """Return how different beams are from those some directions on; NaN where both are silent."""
-    strengths = [one.beam.intensities.astype(np.float32) for one in beams]
-    return np.array([_difference(*pair) for pair in zip(strengths, strengths[_apart(beams) :])])
-
-
-def _difference(one: np.ndarray, other: np.ndarray) -> float:
-    """Return how different the strengths of two beams are: 0 equal, 1 nothing in common; NaN where both are silent."""
-    if len(one) != len(other):
-        return 1.0
-    total = float(one.sum() + other.sum())
-    return float(np.abs(one - other).sum()) / total if total else np.nan
-
-
-def _blind(beams: Sequence[PlacedBeam]) -> Optional[Cause]:
+def _blind(beams: Sequence[Beam]) -> Optional[Cause]:
     """Return whether about half of the circle hears nothing, though the head looks there."""
-    hears = np.array([bool(one.beam.intensities.any()) for one in beams])
-    sector = ((_angles(beams) % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
+    hears = np.array([bool(beam.intensities.any()) for beam in beams])
+    angles = np.array([beam.angle for beam in beams])
+    sector = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
     looked = np.bincount(sector, minlength=_SECTORS)
     if looked.min() < 10:
         return None
@@ -139,9 +63,9 @@ def _blind(beams: Sequence[PlacedBeam]) -> Optional[Cause]:
     return Cause(f"the sonar hears nothing in {degrees:.0f} deg of its circle", _CERTAIN, metres=0.5)
 
 
-def _doubled(beams: Sequence[PlacedBeam]) -> Optional[Cause]:
+def _doubled(beams: Sequence[Beam]) -> Optional[Cause]:
     """Return whether most beams are like themselves at twice the range, more than at any other ratio of ranges."""
-    chosen = (one.beam.intensities.astype(float) for one in beams[:: max(len(beams) // _SAMPLE, 1)])
+    chosen = (beam.intensities.astype(float) for beam in beams[:: max(len(beams) // _SAMPLE, 1)])
     alike = np.array([_alike_at(strengths) for strengths in chosen]).reshape(-1, len(_RATIOS))
     alike = alike[np.isfinite(alike).all(axis=1)]
     if len(alike) < _FEWEST or np.mean(alike[:, 0] > alike[:, 1:].max(axis=1)) < _MOSTLY:
@@ -157,31 +81,29 @@ def _alike_at(strengths: np.ndarray) -> np.ndarray:
         return np.corrcoef(strengths[bins], nearer)[0, 1:]
 
 
-def _loudest(placed: PlacedBeam) -> float:
-    return float(placed.beam.intensities.max())
+def _loudest(beam: Beam) -> float:
+    return float(beam.intensities.max())
 
 
-def _length(placed: PlacedBeam) -> float:
+def _length(beam: Beam) -> float:
     """Return how many bins are strong, m."""
-    strengths = placed.beam.intensities
-    return float(np.count_nonzero(strengths > strengths.max() / 2)) * placed.beam.range_resolution
+    strengths = beam.intensities
+    return float(np.count_nonzero(strengths > strengths.max() / 2)) * beam.range_resolution
 
 
-_MEASURES: Tuple[Tuple[str, Callable[[PlacedBeam], float]], ...] = (
+_MEASURES: Tuple[Tuple[str, Callable[[Beam], float]], ...] = (
     ("the gain changed: echoes are {ratio:.1f} times as strong from then on", _loudest),
     ("gain, pulse length or range setting changed: echoes are {ratio:.1f} times as long from then on", _length),
 )
 """What a change of it means, and what is measured of a beam."""
 
 
-def _changed(
-    times: np.ndarray, beams: Sequence[PlacedBeam], measure: Callable[[PlacedBeam], float], text: str
-) -> Optional[Cause]:
-    """Return when the median of what is measured of beams (n) at `times` (n,) stepped, where both sides are steady.
+def _changed(beams: Sequence[Beam], measure: Callable[[Beam], float], text: str) -> Optional[Cause]:
+    """Return when the median of what is measured of beams stepped, where both sides are steady.
 
     Echoes that are longer than they were may be as long as ever, in reported ranges that are longer than the true ones.
     """
-    values = np.array([measure(one) for one in beams])
+    times, values = np.array([(beam.stamp_ns * 1e-9, measure(beam)) for beam in beams]).reshape(-1, 2).T
     if len(times) < _FEWEST:
         return None
     best = (1.0, np.nan, np.nan)

@@ -2,6 +2,7 @@
 
 import threading
 from collections import deque
+from itertools import takewhile
 from typing import Callable, Deque, List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -19,8 +20,9 @@ from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.standing import standing_causes
+from mlsm_manager.self_check.standing_head import HeadStood, head_stood, of_standing
 from node_support.geometry import composed, move_of
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import Beam
 
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
@@ -28,6 +30,7 @@ _AT_ONCE = 10.0
 """Nats from which on one look is enough. Weaker causes must be found by two in a row: each scan is another chance for a
 wrong one."""
 _MOST_PLACES = 20000  # four days of scans of 16 s
+_BEFORE = 20.0  # s of beams before a scan: whether the head stands is told by some seconds of them
 _MOST_BEAMS = 20000  # of the newest scans: 30 of a head that takes 400 steps a turn are 12000
 
 
@@ -44,7 +47,7 @@ class LiveCauses:
             self._scans: Deque[Scan] = deque(maxlen=_NEWEST)
             self._places: Deque[Tuple[float, float, float]] = deque(maxlen=_MOST_PLACES)
             self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
-            self._beams: Deque[PlacedBeam] = deque(maxlen=_MOST_BEAMS)
+            self._beams: Deque[Beam] = deque(maxlen=_MOST_BEAMS)
             self._usual_difference = 0.0
             self._is_new = False
             self._found: List[Cause] = []
@@ -60,10 +63,23 @@ class LiveCauses:
             self._places.append((scan.reference_time, float(pose[0]), float(pose[1])))
             self._is_new = True
 
-    def hear(self, beam: PlacedBeam) -> None:
+    def hear(self, beam: Beam) -> None:
         """Learn a beam, as the head reports it."""
         with self._lock:
             self._beams.append(beam)
+
+    def turned_as_told(self, times: np.ndarray) -> np.ndarray:
+        """Return whether the head turned as it reported at `times` (n,) s, at the end of what was heard.
+
+        Yes where no beam came.
+        """
+        begin, kept = times.min(initial=np.inf) - _BEFORE, np.ones(len(times), dtype=bool)
+        with self._lock:
+            beams = list(takewhile(lambda beam: beam.stamp_ns * 1e-9 >= begin, reversed(self._beams)))[::-1]
+        for stood in self._head_stood(beams):
+            if not stood.is_told:
+                kept &= (times < stood.begin) | (times > stood.end)
+        return kept
 
     def look(
         self, newest_run: Callable[[], Optional[Solution]] = lambda: None, steps: Sequence[Step] = ()
@@ -77,7 +93,7 @@ class LiveCauses:
             if not self._is_new or len(self._scans) < _FEWEST:
                 return
             self._is_new, scans, places = False, list(self._scans), self._places
-            while self._beams and self._beams[0].beam.stamp_ns * 1e-9 < scans[0].start:
+            while self._beams and self._beams[0].stamp_ns * 1e-9 < scans[0].start:
                 self._beams.popleft()
             beams = list(self._beams)
             begin = np.array(places[0][1:])
@@ -85,7 +101,8 @@ class LiveCauses:
         track = joined([scan.track for scan in scans])
         of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
         path = composed(corrections.at(track.times), track.poses)
-        of_beams = [*self._of_head(beams), *standing_causes(scans, track, path)]
+        of_head = [*of_standing(self._head_stood(beams)), *head_causes(beams)]
+        of_beams = [*of_head, *standing_causes(scans, track, path)]
         spread, by_mounts = np.zeros((2, 2)), 0.0
         course = self._course
         found = [*of_echoes, *of_beams]
@@ -104,10 +121,10 @@ class LiveCauses:
                 self._learn(found, spread, by_mounts, scans[0].start)
                 self._course = course
 
-    def _of_head(self, beams: Sequence[PlacedBeam]) -> List[Cause]:
-        """Return what the newest beams show; if the head stands in all of them, earlier ones tell that it turned."""
-        found, self._usual_difference = head_causes(beams, self._usual_difference)
-        return found
+    def _head_stood(self, beams: Sequence[Beam]) -> List[HeadStood]:
+        """Return when the head stood, of some beams; if in all of them, earlier ones tell that it turned."""
+        stood, self._usual_difference = head_stood(beams, self._usual_difference)
+        return stood
 
     def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
         """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after.

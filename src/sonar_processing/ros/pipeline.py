@@ -15,7 +15,7 @@ from node_support.parameters import ParameterError, ParameterSet
 from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, kept_by_master
-from sonar_processing.beams.beam import PlacedBeam
+from sonar_processing.beams.beam import Beam
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
 from sonar_processing.ros.cloud_topics import (
@@ -130,7 +130,7 @@ class Pipeline:
 
     def __init__(
         self, cloud_sink: Optional[CloudSink] = None, echo_sink: Optional[CloudSink] = None,
-        beam_sink: Callable[[PlacedBeam], None] = lambda _: None,
+        beam_sink: Callable[[Beam], None] = lambda _: None,
     ) -> None:  # fmt: skip
         """`cloud_sink` receives what leaves the last stage of clouds, `echo_sink` the last of polar scans.
 

@@ -62,7 +62,7 @@ class SonarToCloud:
 
     def __init__(
         self, namespace: str = "~", scan_sink: Optional[CloudSink] = None, polar_sink: Optional[CloudSink] = None,
-        beam_sink: Callable[[PlacedBeam], None] = lambda _: None,
+        beam_sink: Callable[[Beam], None] = lambda _: None,
     ) -> None:  # fmt: skip
         """`scan_sink` takes scans, `polar_sink` organised clouds of whole revolutions, `beam_sink` each beam.
 
@@ -120,7 +120,7 @@ class SonarToCloud:
             scan = self._assembler.add(placed)
             revolution = self._revolution.add(placed)
         self.health.count("beams placed")
-        self._beam_sink(placed)
+        self._beam_sink(placed.beam)
         if scan is not None:
             self._publish(scan)
         if revolution is not None:

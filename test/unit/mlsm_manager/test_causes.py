@@ -16,14 +16,15 @@ from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.offline.bag_mapping import with_steady_head
-from mlsm_manager.self_check.beam_causes import beam_causes, head_causes
+from mlsm_manager.offline.bag_mapping import with_steady_head, with_turning_head
+from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.course import CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.standing import standing_causes
+from mlsm_manager.self_check.standing_head import head_stood, of_standing
 from mlsm_manager.self_check.verdict import Answer
 
 pytestmark = pytest.mark.long
@@ -68,24 +69,38 @@ def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said)
 
 def test_nothing_is_named_where_nothing_is_wrong():
     assert found_in(WHOLE).causes == []
-    assert beam_causes(WHOLE.beams) == []
+    assert beam_causes(WHOLE.sent) == []
     assert standing_causes(scans_in(WHOLE), WHOLE.track, WHOLE.track.poses) == []
 
 
 @pytest.mark.parametrize(
     ("recording", "said", "after"),
     [
-        (broken.head_stops(WHOLE, MIDDLE, 60.0), "the head stood for 60 s", MIDDLE),
-        (broken.head_stops(WHOLE, MIDDLE, 60.0, tells=False), "the head stood for ", MIDDLE),
         (broken.gain_changed(WHOLE, MIDDLE, 0.3), "the gain changed: echoes are 0.3 times as strong", MIDDLE),
         (rare.echoes_double(WHOLE, 0.7), "echoes come twice", np.nan),
         (broken.half_blind(WHOLE), "the sonar hears nothing in 170 deg of its circle", np.nan),
     ],
 )
 def test_beams_show_what_is_wrong_with_the_sonar(recording, said, after):
-    (cause,) = beam_causes(recording.beams)
+    (cause,) = beam_causes(recording.sent)
     assert cause.text.startswith(said)
     np.testing.assert_allclose(cause.begin - START, after, atol=12.0)
+
+
+@pytest.mark.parametrize("tells", [True, False])
+def test_what_a_head_hears_while_it_stands_is_left_out_and_the_time_is_named(tells):
+    stood = broken.head_stops(WHOLE, MIDDLE, 60.0, tells=tells)
+    turning, (cause,) = with_turning_head(stood)
+    assert cause.text.startswith("the head stood for 60 s" if tells else "the head stood for ")
+    assert cause.begin - START == pytest.approx(MIDDLE, abs=12.0)
+    left_out = np.setdiff1d(stood.times, turning.times) - START - MIDDLE
+    assert left_out.min() == pytest.approx(0.0, abs=6.0)
+    assert left_out.max() == pytest.approx(60.0, abs=6.0)
+    assert beam_causes(turning.sent) == []
+
+
+def test_all_is_left_of_what_a_head_hears_that_turns():
+    assert with_turning_head(WHOLE) == (WHOLE, [])
 
 
 def test_a_head_whose_angles_tremble_is_named_and_turns_steadily_afterwards():
@@ -166,17 +181,31 @@ def test_a_run_that_goes_on_names_a_head_that_stands_though_it_reports_that_it_t
     live, stood = LiveCauses(), broken.head_stops(WHOLE, MIDDLE, np.inf, tells=False)
     for scan in scans_in(stood):
         live.take(scan, scan.reference_pose)
-    for beam in stood.beams:
+    for beam in stood.sent:
         live.hear(beam)
     live.look()
     assert live.causes([])[0].text.startswith("the head stood for ")
 
 
+def test_a_run_that_goes_on_leaves_out_what_a_head_hears_that_stands_untold():
+    stood, following = broken.head_stops(WHOLE, MIDDLE, 60.0, tells=False), Following(LIMITS, 1.0, monotonic)
+    left, stands = [], []
+    for scan in scans_in(stood):
+        for beam in stood.sent[slice(*np.searchsorted(stood.times, [scan.start, scan.reference_time + 0.01]))]:
+            following.found.hear(beam)
+        left.append(len(following.taken(scan)) / len(scan))
+        stands.append(np.mean((scan.times > START + MIDDLE) & (scan.times < START + MIDDLE + 60.0)))
+    left, stands = np.array(left), np.array(stands)
+    assert np.count_nonzero(stands == 1.0) > 2
+    assert (left[stands == 1.0] == 0.0).all()
+    assert (left[stands == 0.0] == 1.0).all()
+
+
 def test_a_head_that_stands_for_all_of_the_newest_beams_is_known_by_those_before():
-    before = head_causes(WHOLE.beams)
-    standing = shortened(broken.head_stops(WHOLE, 0.0, np.inf, tells=False), 100.0).beams
-    assert before[0] == head_causes(standing)[0] == []
-    (cause,) = head_causes(standing, usual=before[1])[0]
+    before, usual = head_stood(WHOLE.sent)
+    standing = shortened(broken.head_stops(WHOLE, 0.0, np.inf, tells=False), 100.0).sent
+    assert before == head_stood(standing)[0] == []
+    (cause,) = of_standing(head_stood(standing, usual)[0])
     assert cause.text.startswith("the head stood for 9")
 
 

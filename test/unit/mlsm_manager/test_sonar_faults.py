@@ -61,7 +61,7 @@ def test_points_lie_where_they_would_without_the_fault(fault, places):
     ids=["none", "untold", "told", "a few beams cut short"],
 )
 def test_messages_tell_a_change_of_the_range_setting(recording, are_told):
-    assert ranges_are_told(recording.beams) == are_told
+    assert ranges_are_told(recording.sent) == are_told
 
 
 @pytest.mark.parametrize(("size", "tried"), [(np.log(2.0), 2), (np.log(30.0), 0)])
