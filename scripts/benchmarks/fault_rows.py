@@ -62,7 +62,7 @@ _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", 
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"
-_REVERSED, _ENDED = "compass counts the other way", "the last fix came"
+_REVERSED, _ENDED = "compass counts the other way", "the last fix came|no fix came"
 _OFTEN = {"at": 60.0, "every": 60.0}
 
 ROWS = (
@@ -118,7 +118,7 @@ ROWS = (
     FaultRow("gain x {}", broken.gain_changed, _GAIN, "factor", 0.3, True, True),
     FaultRow("echoes {} bins longer", broken.echoes_longer, _GAIN, "bins", 10, begins=True),
     FaultRow("half of the circle blind", broken.half_blind, _BLIND),
-    FaultRow("deaf {} s", broken.deaf, "", "seconds", 120.0, begins=True),
+    FaultRow("deaf {} s", broken.deaf, _ENDED, "seconds", 120.0, begins=True),
     FaultRow("deaf to the end", broken.deaf, _ENDED, begins=True),
     FaultRow("spikes on {} of the beams", broken.spikes, "", "share", 1.0),
     FaultRow("spikes on {} of the beams", broken.spikes, "", "share", 0.31),

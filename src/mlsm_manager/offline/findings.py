@@ -33,6 +33,7 @@ from node_support.parameters import describe
 from sonar_processing.beams.parameters import BeamCorrection
 
 _FEWEST_SCANS = 20  # a window's worth: fewer say too little of scale and delay
+_MISSED = 3.0  # usual times between fixes: two were missed
 _OF_RUN = ("range_scale_error", "sonar_delay")  # as the solver's unknowns of the run are ordered
 
 
@@ -138,17 +139,29 @@ class _BestPath(NamedTuple):
             expected=np.append(self.expected, self.expected[-1]),
         )
 
-    def cause_of_end(self, end: Optional[PlaceNow]) -> List[Cause]:
-        """Return a cause that tells when the last fix came, if the position has been lost since; else none.
+    def causes_of_silence(self, fixes: np.ndarray, end: Optional[PlaceNow]) -> List[Cause]:
+        """Return when fixes were missing for so long that the position was lost, the longest time, and at the end.
 
-        end: see Replayed.at_end.
+        What else is wrong may be why they were missing, but for the end it comes first.
+
+        fixes: (n,) s, when they came. end: see Replayed.at_end.
         """
-        if end is None:
-            return []
-        begin, deviations = end.time - end.age, radii(self.covariances)
-        grown = np.sqrt(max(deviations[-1] ** 2 - np.interp(begin, self.times, deviations) ** 2, 0.0))
-        text = f"the last fix came {end.age:.0f} s before the end,"
-        return [Cause(text, CERTAIN, begin)] if grown > LARGEST_DEVIATION else []
+        usual = np.median(np.diff(fixes)) if len(fixes) > 1 else np.inf
+        gaps = ((begin, until) for begin, until in zip(fixes[:-1], fixes[1:]) if until - begin > _MISSED * usual)
+        lost = [gap for gap in gaps if self._is_lost_between(*gap)]
+        longest = max(lost, key=np.ptp, default=None)
+        causes = [] if longest is None else [Cause(f"no fix came for {np.ptp(longest):.0f} s,", 0.0, longest[0])]
+        if end is not None and self._is_lost_between(end.time - end.age, end.time):
+            text = f"the last fix came {end.age:.0f} s before the end,"
+            causes.append(Cause(text, CERTAIN, end.time - end.age))
+        return causes
+
+    def _is_lost_between(self, begin: float, end: float) -> bool:
+        """Return whether the position grows uncertain by more than 5 m between two times [s]."""
+        deviations = radii(self.covariances)
+        between = deviations[slice(*np.searchsorted(self.times, [begin, end], side="right"))]
+        before = np.interp(begin, self.times, deviations)
+        return bool(np.sqrt(max(between.max(initial=0.0) ** 2 - before**2, 0.0)) > LARGEST_DEVIATION)
 
 
 def _live_path(replayed: Replayed) -> _BestPath:
@@ -266,7 +279,7 @@ class Findings:
             closing = refined.closing
         best = best.to_the_end(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
         verdicts = [*_checks(replayed, best, calibration), *further]
-        causes = ranked([*causes, *best.cause_of_end(replayed.at_end)])
+        causes = ranked([*causes, *best.causes_of_silence(replayed.fixes, replayed.at_end)])
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 
     def to_mapping(self) -> Dict[str, Any]:

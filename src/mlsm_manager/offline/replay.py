@@ -171,8 +171,14 @@ class Replayed:
         return self.estimator.solver
 
     @property
+    def fixes(self) -> np.ndarray:
+        """(n,) s, the ends of the scans that told where the vehicle was."""
+        matched = (update for update in self.updates if update.accepted and update.result is not None)
+        return np.array([update.scan.reference_time for update in matched])
+
+    @property
     def matched(self) -> int:
-        return sum(update.accepted and update.result is not None for update in self.updates)
+        return len(self.fixes)
 
     @property
     def corrections(self) -> Optional[Track]:
