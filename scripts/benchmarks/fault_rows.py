@@ -62,7 +62,7 @@ _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", 
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"
-_REVERSED, _ENDED = "compass counts the other way", "the last fix came|no fix came"
+_REVERSED, _ENDED = "compass counts the other way", "the last fix came|no echo came"
 _OFTEN = {"at": 60.0, "every": 60.0}
 
 ROWS = (

@@ -33,7 +33,6 @@ from node_support.parameters import describe
 from sonar_processing.beams.parameters import BeamCorrection
 
 _FEWEST_SCANS = 20  # a window's worth: fewer say too little of scale and delay
-_MISSED = 3.0  # usual times between fixes: two were missed
 _OF_RUN = ("range_scale_error", "sonar_delay")  # as the solver's unknowns of the run are ordered
 
 
@@ -139,18 +138,15 @@ class _BestPath(NamedTuple):
             expected=np.append(self.expected, self.expected[-1]),
         )
 
-    def causes_of_silence(self, fixes: np.ndarray, end: Optional[PlaceNow]) -> List[Cause]:
-        """Return when fixes were missing for so long that the position was lost, the longest time, and at the end.
+    def causes_of_silence(self, silences: Sequence[Tuple[float, float]], end: Optional[PlaceNow]) -> List[Cause]:
+        """Return when nothing was heard for so long that the position was lost, the longest time, and at the end.
 
-        What else is wrong may be why they were missing, but for the end it comes first.
+        What else is wrong may be why, but for the end it comes first.
 
-        fixes: (n,) s, when they came. end: see Replayed.at_end.
+        silences, end: see Replayed.silences and at_end.
         """
-        usual = np.median(np.diff(fixes)) if len(fixes) > 1 else np.inf
-        gaps = ((begin, until) for begin, until in zip(fixes[:-1], fixes[1:]) if until - begin > _MISSED * usual)
-        lost = [gap for gap in gaps if self._is_lost_between(*gap)]
-        longest = max(lost, key=np.ptp, default=None)
-        causes = [] if longest is None else [Cause(f"no fix came for {np.ptp(longest):.0f} s,", 0.0, longest[0])]
+        longest = max((one for one in silences if self._is_lost_between(*one)), key=np.ptp, default=None)
+        causes = [] if longest is None else [Cause(f"no echo came for {np.ptp(longest):.0f} s,", 0.0, longest[0])]
         if end is not None and self._is_lost_between(end.time - end.age, end.time):
             text = f"the last fix came {end.age:.0f} s before the end,"
             causes.append(Cause(text, CERTAIN, end.time - end.age))
@@ -279,7 +275,7 @@ class Findings:
             closing = refined.closing
         best = best.to_the_end(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
         verdicts = [*_checks(replayed, best, calibration), *further]
-        causes = ranked([*causes, *best.causes_of_silence(replayed.fixes, replayed.at_end)])
+        causes = ranked([*causes, *best.causes_of_silence(replayed.silences, replayed.at_end)])
         return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
 
     def to_mapping(self) -> Dict[str, Any]:

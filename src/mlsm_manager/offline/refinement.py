@@ -18,6 +18,7 @@ from mlsm_manager.scan_matching.scan import MapCloud, Track
 from mlsm_manager.self_check.causes import Suspicion
 from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
+from mlsm_manager.self_check.other_places import with_other_places
 from mlsm_manager.self_check.path_checks import settings_agree, starts_agree
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks
@@ -75,7 +76,7 @@ def refine(
     closing = with_loops_closed(solver, best)
     done()
     run = solver.solution.with_state(closing.batch.state)
-    motion = without_faults(run, closing.batch, track, suspicion)
+    motion = with_other_places(without_faults(run, closing.batch, track, suspicion))
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in replayed.scans:

@@ -31,6 +31,7 @@ from sonar_processing.filters.echo_extractor import EchoExtractorParameters
 from sonar_processing.scans.parameters import SonarToCloudParameters
 
 _ALL = 10**9  # scans
+_SILENT = 60.0  # s: a turn of a slow head and another one, within which a real sonar may hear nothing
 
 
 @dataclass(frozen=True)
@@ -171,14 +172,14 @@ class Replayed:
         return self.estimator.solver
 
     @property
-    def fixes(self) -> np.ndarray:
-        """(n,) s, the ends of the scans that told where the vehicle was."""
-        matched = (update for update in self.updates if update.accepted and update.result is not None)
-        return np.array([update.scan.reference_time for update in matched])
+    def silences(self) -> List[Tuple[float, float]]:
+        """From when to when [s] no echo was heard, for more than a minute."""
+        ends = [scan.reference_time for scan in self.scans if len(scan)]
+        return [(begin, end) for begin, end in zip(ends[:-1], ends[1:]) if end - begin > _SILENT]
 
     @property
     def matched(self) -> int:
-        return len(self.fixes)
+        return sum(update.accepted and update.result is not None for update in self.updates)
 
     @property
     def corrections(self) -> Optional[Track]:

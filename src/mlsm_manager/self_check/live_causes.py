@@ -19,6 +19,7 @@ from mlsm_manager.self_check.course import NOT_TOLD, CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
+from mlsm_manager.self_check.other_places import with_other_places
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.standing_head import HeadStood, head_stood, of_standing
 from node_support.geometry import composed, move_of
@@ -168,7 +169,7 @@ def _motion_of(
     mapped: T_map_base of these scans. begin: (2,) m in map, from where the vehicle was followed.
     """
     track = run.log.odometry.track_from(-np.inf)
-    motion = without_faults(run, fit_of(run), track, Suspicion(suspected))
+    motion = with_other_places(without_faults(run, fit_of(run), track, Suspicion(suspected)))
     solved, first = track.with_poses(motion.run.path(track.times)), run.log.node_times[:1]
     # A part of a run is solved about its own first place.
     apart = (solved.at(first) - mapped.at(first))[0, :2]

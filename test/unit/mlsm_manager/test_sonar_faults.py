@@ -105,10 +105,10 @@ def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
 
 
 @pytest.mark.long
-def test_a_time_without_fixes_is_named_in_which_the_position_is_lost():
+def test_a_time_without_echoes_is_named_in_which_the_position_is_lost():
     recording = broken.beams_stop(source("harbour compass", 400.0), 128.0, 92.0)
     cause = mapped_as(recording, "--refine").findings.trust.causes[-1]
-    assert cause.text.startswith("no fix came for 1")
+    assert cause.text.startswith("no echo came for 1")
     assert cause.begin == pytest.approx(recording.track.times[0] + 128.0, abs=10.0)
 
 

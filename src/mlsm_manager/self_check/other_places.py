@@ -1,0 +1,92 @@
+"""Whether a run fits its echoes elsewhere too: where piers repeat, nothing tells a compass alone how far it went."""
+
+from dataclasses import replace
+from typing import Iterator, List, NamedTuple, Tuple
+
+import numpy as np
+
+from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
+from mlsm_manager.joint_solver.solution import Solution
+from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.motion_findings import MotionFindings
+
+_SHIFTS = (-3.0, 3.0)  # m along the way: from there a fit finds places up to as far again, or comes back
+_MOMENTS = 16  # at most, from which on a run is shifted: each costs two fits
+_STEP = 0.5  # m between nodes: with less the vehicle stands
+_FEWEST = 15  # nodes: fewer meet in too few places
+# Nats by which a run may be less likely elsewhere. Where piers repeat, the true place was from 5.3 less likely to 3.7
+# more than the one that was found.
+_NATS = 5.0
+_AS_MANY = 1.05  # times as many comparisons at most, or as few: on a path that is too short more is compared
+_BEYOND = 2.0  # stated deviations: what is nearer is stated already. Unbroken runs in a marina had up to 1.6
+_LEAST = 0.1  # m
+
+
+class Elsewhere(NamedTuple):
+    """A run that goes elsewhere from `begin` [s] on, and its fit.
+
+    apart: (n, 2) m, how far its nodes lie beside. gain: of log likelihood, in as many comparisons.
+    """
+
+    begin: float
+    run: Solution
+    fit: BatchResult
+    apart: np.ndarray
+    gain: float
+
+    @property
+    def metres(self) -> float:
+        return float(np.hypot(*self.apart.T).max())
+
+
+def with_other_places(found: MotionFindings) -> MotionFindings:
+    """Return the findings of a run by a compass alone with the likeliest of the places where it may have gone.
+
+    The farthest of the others makes it uncertain, and is named.
+    """
+    if not (found.is_alone and found.is_told) or found.run.parameters.node_search is not None:
+        return found
+    others = other_places(found.run, found.fit)
+    if not others:
+        return found
+    best, farthest = max(others, key=lambda one: one.gain), max(others, key=lambda one: one.metres)
+    text = f"echoes fit nearly as well with the vehicle {farthest.metres:.1f} m elsewhere,"
+    found = replace(found, causes=[*found.causes, Cause(text, 0.0, farthest.begin)])
+    if best.gain <= 0.0:
+        return replace(found, apart=[*found.apart, farthest.apart])
+    beside = max((-best.apart, farthest.apart - best.apart), key=lambda one: float(np.hypot(*one.T).max()))
+    return replace(found, run=best.run, fit=best.fit, apart=[*found.apart, beside])
+
+
+def other_places(run: Solution, fit: BatchResult) -> List[Elsewhere]:
+    """Return runs that are nearly as likely as the one at the state of `fit`, and lie farther away than that states.
+
+    The fit starts again with all nodes from some moment on shifted along the way.
+    """
+    if len(fit.node_times) < _FEWEST:
+        return []
+    compared, likelihood = compared_since(run, np.nan)
+    deviations = np.maximum(np.sqrt(np.trace(fit.pose_covariances[:, :2, :2], axis1=1, axis2=2)), _LEAST)
+    found = []
+    for node, shift in _starts(run.places):
+        start = fit.state.copy()
+        start.nodes[node:, :2] += shift
+        other = fit_of(run.with_state(start))
+        shifted = run.with_state(other.state)
+        apart = shifted.places - run.places
+        apart -= apart[0]
+        ratio = compared_since(shifted, np.nan)[0] / compared
+        gain = other.log_likelihood - fit.log_likelihood - (ratio - 1.0) * likelihood
+        is_far = np.mean((np.hypot(*apart.T) / deviations)[node:]) > _BEYOND
+        if is_far and gain > -_NATS and 1.0 / _AS_MANY < ratio < _AS_MANY:
+            found.append(Elsewhere(float(fit.node_times[node]), shifted, other, apart, gain))
+    return found
+
+
+def _starts(places: np.ndarray) -> Iterator[Tuple[int, np.ndarray]]:
+    """Yield nodes of a path (n, 2), from which on it is to be shifted, and by what, (2,) m."""
+    for node in range(2, len(places) - 2, max(len(places) // _MOMENTS, 1)):
+        step = places[node + 1] - places[node - 1]
+        length = float(np.hypot(*step))
+        if length > 2.0 * _STEP:
+            yield from ((node, shift * step / length) for shift in _SHIFTS)
