@@ -19,7 +19,7 @@ _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not t
 _SLIP_TOLD = np.radians(12.0)  # three deviations of a compass that turns quickly, or in a gap of the odometry
 _SWAPPED = np.radians(30.0)  # from 90 deg: a vehicle that goes ahead does not tell such a turn from x for y
 _SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0, 4.0))]
-_RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-5.0, 6.0) / 5.0) if factor != 1.0]
+_RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-7.0, 8.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
 _CARRIED = 1.3  # times as far as usual: less is no reason to name a current by pairs alone
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
