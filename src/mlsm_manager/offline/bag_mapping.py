@@ -127,7 +127,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
     of_beams = [*beam_causes(recording.sent), *standing_causes(heard.scans, recording.track, replayed.corrected)]
     refined = _refined(replayed, recording, parameters, found.suspected, [*of_echoes, *of_beams], options)
     runs = _runs(replayed, refined)
-    if found.mount == AS_TOLD and _positions_mislead(recording, heard.scans, extracting, odometry, runs, options):
+    if _positions_mislead(recording, heard.scans, extracting, odometry, runs, found.mount, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
         cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
         known = OdometryFound(OdometryKind.HEADING, reason)
@@ -207,17 +207,31 @@ def _followed(
 
 def _positions_mislead(
     recording: Recording, scans: List[Scan], extracting: ReplayParameters, odometry: OdometryFound,
-    believed: Sequence[Solution], options: Namespace,
+    believed: Sequence[Solution], mount: Hypothesis, options: Namespace,
 ) -> bool:  # fmt: skip
     """Return whether scans go on clearly better without reported positions than in all runs that believe these.
 
-    No where somebody named the odometry.
+    No where somebody named the odometry. mount: of the sonar, as the echoes tell it; with that scans must not go on.
     """
-    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and len(believed) > 0
+    asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and len(believed) > 0 and not mount.is_over
     if not asked or not all(map(goes_astray, believed)):
         return False
+    if mount != AS_TOLD:
+        believed = [_as_mounted(recording, extracting, odometry, options)]
+        if not goes_astray(believed[0]):
+            return False
     alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
     return goes_on_better(believed[-1], alone.solver.solution)
+
+
+def _as_mounted(
+    recording: Recording, extracting: ReplayParameters, odometry: OdometryFound, options: Namespace
+) -> Solution:  # fmt: skip
+    """Return the live run of a recording whose mount is put right as the echoes tell it."""
+    asked = Namespace(**{**vars(options), "fix_mount": True})
+    heard = _heard(recording, odometry, EchoExtractor(extracting.echoes()), asked)
+    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
+    return _replayed(heard.recording, heard.scans, parameters).solver.solution
 
 
 def _moves_are_turned(recording: Recording, mount: Hypothesis, options: Namespace) -> bool:
