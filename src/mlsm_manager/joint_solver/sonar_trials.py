@@ -124,7 +124,8 @@ def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, BatchResult
     """Return a run without a fault of its sonar, and its fit.
 
     After a change of ranges it begins where the odometry leads, or, where that tells no distances, with a path that is
-    as much longer: the path that they made may be far from the true one.
+    as much longer: the path that they made may be far from the true one. It may also be near, where some scans met the
+    map: so it begins from that, too.
     """
     log = fault.logged(run.log)
     fits = []
@@ -142,7 +143,8 @@ def _starts(run: Solution, log: RunLog, fault: SonarFault) -> List[np.ndarray]:
         return [reckoned(run, log, run.state.nodes, (fault.begin, np.inf))]
     before = int(np.searchsorted(log.node_times, fault.begin)) - 1
     # The first scan after the change may have moved the node before it: the fit begins from the one before that, too.
-    return [_longer(run, log, fault, first) for first in sorted({max(before, 0), max(before - 1, 0)})]
+    longer = [_longer(run, log, fault, first) for first in sorted({max(before, 0), max(before - 1, 0)})]
+    return [run.state.nodes.copy(), *longer]
 
 
 def _longer(run: Solution, log: RunLog, fault: SonarFault, first: int) -> np.ndarray:

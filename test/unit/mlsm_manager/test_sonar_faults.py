@@ -99,6 +99,13 @@ def test_a_change_of_ranges_is_named_beside_a_compass_where_the_vehicle_passes_n
 
 
 @pytest.mark.long
+def test_a_change_of_ranges_is_named_beside_a_compass_where_the_path_went_on_by_the_map():
+    recording = broken.range_changed(source("harbour compass", 400.0), 182.0, 0.581)
+    (cause,) = mapped_as(recording, "--refine", *NAMED).findings.trust.causes
+    assert cause.text.startswith("the range setting changed untold: reported ranges are 1.7")
+
+
+@pytest.mark.long
 def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
     short_at_first = broken.range_told(source("harbour compass", 400.0), 0.0, 0.385, 300.0)
     assert mapped_as(short_at_first, "--refine", *NAMED).findings.trust.causes == []
