@@ -11,7 +11,7 @@ from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.motion_findings import MotionFindings
 
 _SHIFTS = (-3.0, 3.0)  # m along the way: from there a fit finds places up to as far again, or comes back
-_MOMENTS = 16  # at most, from which on a run is shifted: each costs two fits
+_MOMENTS = 16  # about as many, from which on a run is shifted: each costs two fits
 _STEP = 0.5  # m between nodes: with less the vehicle stands
 _FEWEST = 8  # nodes: fewer meet in too few places
 # Nats by which a run may be less likely elsewhere. Where piers repeat, the true place was from 1.5 nats less likely to
