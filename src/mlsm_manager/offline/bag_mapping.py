@@ -16,9 +16,9 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind, strafes
 from mlsm_manager.odometry.faults import Mirror
-from mlsm_manager.odometry.mending import mended
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings
+from mlsm_manager.offline.mended_recording import with_odometry_mended, with_steady_head, with_turning_head
 from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, refine, refitted_verdicts
 from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
@@ -35,17 +35,8 @@ from mlsm_manager.offline.suited_parameters import (
 )
 from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.self_check.beam_causes import beam_causes, of_trembling, ranges_are_told
-from mlsm_manager.self_check.causes import (
-    CERTAIN,
-    NOTHING_ASSUMED,
-    Assumption,
-    Cause,
-    Fault,
-    Suspicion,
-    of_steps,
-    of_stuck,
-)
+from mlsm_manager.self_check.beam_causes import beam_causes, ranges_are_told
+from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, Fault, Suspicion
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
@@ -53,17 +44,14 @@ from mlsm_manager.self_check.fault_trials import with_other_ranges
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
-from mlsm_manager.self_check.standing_head import head_stood, of_standing
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
 from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.beams.parameters import BeamCorrection
-from sonar_processing.beams.steady_head import steadied
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes with a compass alone does not show"
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
-_MOSTLY = 0.9  # share of the beams whose angles are mended: then those of the head are
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
 
 
@@ -211,7 +199,8 @@ def _positions_mislead(
 ) -> bool:  # fmt: skip
     """Return whether scans go on clearly better without reported positions than in all runs that believe these.
 
-    No where somebody named the odometry. mount: of the sonar, as the echoes tell it; with that scans must not go on.
+    False where somebody named the odometry. mount: of the sonar, as the echoes tell it. Where it is not as told, scans
+    must go on badly with that mount, too.
     """
     asked = odometry.kind is OdometryKind.AUTO and not _is_named(options) and len(believed) > 0 and not mount.is_over
     if not asked or not all(map(goes_astray, believed)):
@@ -374,31 +363,3 @@ def _run(
     paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
     further = [path for path in paths if len(path.times)]
     return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, trust, further)
-
-
-def with_steady_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
-    """Return a recording whose head's angles do not tremble, and what was wrong with it."""
-    found = steadied(recording.sent)
-    if found is None:
-        return recording, []
-    beams = [replace(placed, beam=beam) for placed, beam in zip(recording.beams, found.beams)]
-    return replace(recording, beams=beams), [of_trembling(np.degrees(found.deviation), found.share > _MOSTLY)]
-
-
-def with_turning_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
-    """Return a recording without what a head that stood heard, and what was wrong with it."""
-    stood, _ = head_stood(recording.sent)
-    for one in stood:
-        recording = recording.without_beams(one.begin, one.end)
-    return recording, of_standing(stood)
-
-
-def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:
-    """Return a recording whose odometry goes where a vehicle can have gone, and what was wrong with it."""
-    track, steps, stuck, untold = mended(recording.track, limits)
-    causes = [*of_steps(steps), *(of_stuck(*one) for one in stuck)]
-    if not causes:
-        return recording, []
-    for begin, end in untold:
-        recording = recording.without_beams(begin, end)
-    return recording.with_track(track), causes

@@ -141,7 +141,7 @@ class _BestPath(NamedTuple):
     def causes_of_silence(self, silences: Sequence[Tuple[float, float]], end: Optional[PlaceNow]) -> List[Cause]:
         """Return when nothing was heard for so long that the position was lost, the longest time, and at the end.
 
-        What else is wrong may be why, but for the end it comes first.
+        In mid-run it ranks last, as another cause may explain it; at the end it ranks first.
 
         silences, end: see Replayed.silences and at_end.
         """

@@ -72,7 +72,7 @@ class LiveCauses:
     def turned_as_told(self, times: np.ndarray) -> np.ndarray:
         """Return whether the head turned as it reported at `times` (n,) s, at the end of what was heard.
 
-        Yes where no beam came.
+        True where no beam came.
         """
         begin, kept = times.min(initial=np.inf) - _BEFORE, np.ones(len(times), dtype=bool)
         with self._lock:
@@ -124,7 +124,9 @@ class LiveCauses:
 
     def _head_stood(self, beams: Sequence[Beam]) -> List[HeadStood]:
         """Return when the head stood, of some beams; if in all of them, earlier ones tell that it turned."""
-        stood, self._usual_difference = head_stood(beams, self._usual_difference)
+        stood, usual = head_stood(beams, self._usual_difference)
+        with self._lock:
+            self._usual_difference = max(self._usual_difference, usual)
         return stood
 
     def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:

@@ -16,7 +16,7 @@ from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.offline.bag_mapping import with_steady_head, with_turning_head
+from mlsm_manager.offline.mended_recording import with_steady_head, with_turning_head
 from mlsm_manager.self_check.beam_causes import beam_causes
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.course import CourseFound
