@@ -35,6 +35,12 @@ def odometry_noisy(recording: Recording, metres: float, seed: int = 1) -> Record
     return with_odometry(recording, recording.track.poses + noise)
 
 
+def odometry_rounded(recording: Recording, metres: float, degrees: float = 1.0) -> Recording:
+    """Let positions be rounded to some metres, and headings to some degrees, as in a log of text."""
+    unit = np.array([metres, metres, np.radians(degrees)])
+    return with_odometry(recording, np.round(recording.track.poses / unit) * unit)
+
+
 def odometry_drifts(recording: Recording, at: float, speed: float, seconds: float = np.inf) -> Recording:
     """Let a current carry the vehicle that the odometry does not feel, as where a DVL has lost the bottom."""
     since = np.clip(recording.track.times - recording.track.times[0] - at, 0.0, seconds)

@@ -50,6 +50,7 @@ class StepKind(Enum):
     HUNG = "odometry hung for {seconds:.0f} s, and missed how far the vehicle went,"
 
 
+JUMPS_AFTER_STANDING = (StepKind.HELD, StepKind.HUNG)
 LONGEST_STALL = 30.0  # s: a vehicle may have done anything meanwhile
 
 

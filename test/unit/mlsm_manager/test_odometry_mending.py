@@ -151,6 +151,13 @@ def test_poses_that_are_told_again_and_again_are_left_out():
     assert np.abs(mended.track.at(times) - WHOLE.track.poses)[:-20].max() < 0.3
 
 
+def test_a_position_that_is_rounded_does_not_stall():
+    rounded = rare.odometry_rounded(broken.odometry_scaled(TREMBLING, 0.2), 0.1, 0.01)
+    mended, causes = with_odometry_mended(rounded, LIMITS)
+    assert mended is rounded
+    assert causes == []
+
+
 def test_positions_that_tremble_are_smoothed():
     mended, causes = with_odometry_mended(rare.odometry_noisy(WHOLE, 0.5), LIMITS)
     assert [cause.text for cause in causes] == ["reported positions tremble by about 0.5 m"]
