@@ -153,6 +153,7 @@ ROWS = (
     FaultRow("something follows at {} m", rare.hull_heard, "goes along", "metres", 5.0),
     FaultRow("noise of {} in each bin", rare.noise_rises, "", "level", 30.0, begins=True),
     FaultRow("gain fades to {}", rare.gain_fades, "", "factor", 0.3, True),
+    FaultRow("all ranges {} times too short", broken.range_changed, _LENGTHS, "factor", 3.28, True, others={"at": 0.0}),
     FaultRow("odometry rounded to {} m", rare.odometry_rounded, "", "metres", 0.1),
 )  # fmt: skip
 

@@ -60,7 +60,9 @@ class MotionFault:
             missed = f" and missed {np.degrees(self.sizes[0]):.0f} deg," if size else ""
             return f"the compass stuck for {self.end - self.begin:.0f} s{missed}"
         if self.kind in OF_DISTANCES:
-            return f"reported distances are {np.exp(-self.sizes[0]):.2f} times the true ones"
+            factor = float(np.exp(-self.sizes[0]))
+            ranges = f", or reported ranges {1.0 / factor:.2f} times" if self.kind is FaultKind.LENGTH else ""
+            return f"reported distances are {factor:.2f} times the true ones{ranges}"
         if self.kind is FaultKind.DRIFT:
             return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
         if self.kind is FaultKind.RIGHT:

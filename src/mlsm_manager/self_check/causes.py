@@ -95,6 +95,11 @@ def of_steps(steps: Sequence[Step]) -> List[Cause]:
     return [cause for of_kind in kinds for cause in _of_kind(of_kind)]
 
 
+def unsure_length(size: float) -> float:
+    """Return by how much the length of a path is unsure, relative, that may as well be exp(-size) times as long."""
+    return float(np.abs(np.expm1(-size)) / np.sqrt(2.0))
+
+
 def of_stuck(begin: float, end: float) -> Cause:
     """Return the cause for a heading that stood from `begin` to `end` [s] while the vehicle went on."""
     fault = MotionFault(FaultKind.STUCK, begin, (0.0,), end)

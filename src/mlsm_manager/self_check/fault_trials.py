@@ -20,7 +20,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
 )
 from mlsm_manager.odometry.faults import OF_DISTANCES, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same, unsure_length
 from mlsm_manager.self_check.motion_findings import MotionFindings
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
@@ -254,8 +254,8 @@ def _gain(trial: _Trial) -> float:
 def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:
     run, fault = trial.fitted, trial.fault
     # With a compass alone it may as well be the ranges before it that are wrong, and with them the size of all.
-    is_size = found.is_alone and isinstance(fault, SonarFault) and fault.kind is SonarKind.RANGES
-    length = float(np.abs(np.expm1(-fault.sizes[0])) / np.sqrt(2.0)) if is_size else 0.0
+    is_size = fault.kind is FaultKind.LENGTH or (found.is_alone and fault.kind is SonarKind.RANGES)
+    length = unsure_length(fault.sizes[0]) if is_size else 0.0
     certain = CERTAIN if fault.kind is FaultKind.STUCK else 0.0  # that it did its headings tell
     cause = Cause(fault.text, certain + trial.gain, fault.begin, length=length, fault=fault)
     return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

@@ -6,12 +6,13 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult
-from mlsm_manager.joint_solver.motion_models import DIRECTION
+from mlsm_manager.joint_solver.motion_models import DIRECTION, SCALE
 from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause, is_same
+from mlsm_manager.self_check.causes import Cause, is_same, unsure_length
 from mlsm_manager.self_check.course import (
     NAMED,
     NAMED_LIVE,
@@ -27,6 +28,7 @@ from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
+_UNLIKELY_LENGTH = np.log(1.7)  # thrusters err by a third; sonars set to half or twice the range, and feet, by more
 
 
 @dataclass(frozen=True)
@@ -139,9 +141,23 @@ class MotionFindings:
         turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
         return CourseFound(-turn, float(model.first_deviations()[DIRECTION]))
 
+    @property
+    def _length(self) -> Tuple[float, float]:
+        """The logarithm of true distances over reported ones as the run found it, and the deviation of that before the
+        run; zero where none are reported.
+        """
+        model = self.run.parameters.odometry
+        if SCALE not in model.calibrated.values():
+            return 0.0, 1.0
+        found, expected = (float(np.log1p(node[SCALE])) for node in (self.run.state.nodes[-1], model.first_node()))
+        return found - expected, float(model.first_deviations()[SCALE])
+
     def _calibration_causes(self) -> List[Cause]:
-        """Return what is unlikely of the direction and the delay that the run found."""
-        found, direction = [], self._direction
+        """Return what is unlikely of the distances, the direction and the delay that the run found."""
+        found, direction, (length, usual) = [], self._direction, self._length
+        if abs(length) > _UNLIKELY_LENGTH:
+            fault = MotionFault(FaultKind.LENGTH, np.nan, (length,))
+            found.append(Cause(fault.text, 0.5 * (length / usual) ** 2, length=unsure_length(length)))
         delay, deviation = self._delay
         size = abs(delay) / deviation
         if size > _UNLIKELY_DELAY:

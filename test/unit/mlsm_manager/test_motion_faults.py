@@ -52,7 +52,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
     [
         (DRIFT, "the compass drifts by +3.4 deg per minute"),
         (STEP, "the head slipped by 11 deg, or the compass stepped,"),
-        (LENGTH, "reported distances are 0.90 times the true ones"),
+        (LENGTH, "reported distances are 0.90 times the true ones, or reported ranges 1.11 times"),
         (DISTANCES, "reported distances are 1.49 times the true ones"),
         (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
         (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
@@ -190,9 +190,18 @@ def test_nothing_is_named_where_nothing_is_wrong():
 
 
 @pytest.mark.long
-def test_distances_in_feet_do_not_make_the_moves_of_a_vehicle_that_strafes_look_mirrored():
+def test_distances_in_feet_are_named_and_do_not_make_the_moves_of_a_vehicle_that_strafes_look_mirrored():
     in_feet = broken.odometry_scaled(source("turning", 600.0), 3.28)
-    assert mapped_as(in_feet, "--refine").findings.trust.causes == []
+    (cause,) = mapped_as(in_feet, "--refine").findings.trust.causes
+    assert cause.text.startswith("reported distances are 3.")
+
+
+@pytest.mark.long
+def test_ranges_in_feet_are_named_and_how_far_off_they_lead_is_stated():
+    right = source("harbour", 300.0)
+    whole, in_feet = (mapped_as(one, "--refine") for one in (right, broken.range_changed(right, 0.0, 3.28)))
+    assert_named_first(in_feet.findings, "reported distances are 3.")
+    assert outcome(in_feet, whole, named="").covered > 0.95
 
 
 @pytest.mark.long
