@@ -12,6 +12,9 @@ _SECONDS, _GONE = 10.0, 1.0  # s of a stretch, and m in it from which on it has 
 _FEWEST = 10  # stretches
 _AHEAD = np.radians(2.5)  # by which the direction differs in which vehicles are said to go ahead
 _STRAFES, _MOSTLY = np.radians(30.0), 0.9  # so many stretches are less far aside where there is a usual course
+# The same by a compass alone: where a sonar is turned by 65 to 90 deg, 15 % of a marina's stretches are too slow to be
+# put right, as such a vehicle is expected to go ahead.
+MOSTLY_ALONE = 0.75
 _VAGUE = np.radians(5.0)  # deviation of the mean course: sonar and DVL are mounted by eye to 6 deg; a marina's: 4.8 deg
 _CLEAR = 10.0  # deviations: so large a turn is told however vague it is
 _ASIDE = 0.5  # share of the course that the echoes may not agree to: the odometry's direction errs besides
@@ -64,10 +67,10 @@ NOT_TOLD = CourseFound(0.0, np.inf)
 """Of a vehicle that was not seen for long enough."""
 
 
-def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
+def course_of(path: Track, largest: float = LARGEST, mostly: float = _MOSTLY) -> CourseFound:
     """Return what a path T_map_base tells of the sonar's turn, if the vehicle usually goes ahead; needs the past only.
 
-    largest: rad, beyond which it tells nothing.
+    largest: rad, beyond which it tells nothing. mostly: share of its stretches that go about as usual.
 
     Echoes tell the motion against the sonar. A vehicle that seems to go to the right, however its odometry's own
     sensor is mounted, has a sonar that is turned to the left.
@@ -85,7 +88,7 @@ def course_of(path: Track, largest: float = LARGEST) -> CourseFound:
     spread = 1.48 * float(np.median(np.abs(aside)))
     deviation = np.hypot(1.25 * spread / np.sqrt(_worth(aside, spread)), _AHEAD)
     # A vehicle that strafes may go one way for half of its time, and the median tells only that.
-    strafes = bool(np.quantile(np.abs(aside), _MOSTLY) > _STRAFES or abs(middle) > largest)
+    strafes = bool(np.quantile(np.abs(aside), mostly) > _STRAFES or abs(middle) > largest)
     is_clear = deviation <= _VAGUE or abs(middle) > _CLEAR * deviation
     return CourseFound(-middle, float(deviation) if is_clear and not strafes else np.inf, strafes)
 

@@ -14,6 +14,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, is_same, unsure_length
 from mlsm_manager.self_check.course import (
+    MOSTLY_ALONE,
     NAMED,
     NAMED_LIVE,
     NOT_TOLD,
@@ -112,7 +113,7 @@ class MotionFindings:
 
     def _course_of(self, path: Track) -> CourseFound:
         if self.is_alone:  # nothing else tells a turn of the sonar, however large it is
-            return course_of(path, np.pi)
+            return course_of(path, np.pi, MOSTLY_ALONE)
         course = course_of(path)
         return course._replace(deviation=np.inf, strafes=True) if odometry_agrees(course, self.track) else course
 

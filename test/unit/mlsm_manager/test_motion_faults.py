@@ -16,7 +16,15 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.course import NAMED, NOT_TOLD, CourseFound, course_causes, course_of, odometry_agrees
+from mlsm_manager.self_check.course import (
+    MOSTLY_ALONE,
+    NAMED,
+    NOT_TOLD,
+    CourseFound,
+    course_causes,
+    course_of,
+    odometry_agrees,
+)
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
 
@@ -231,11 +239,14 @@ def test_a_vehicle_strafes_only_where_it_was_seen_long_enough(stretches, strafes
     assert (found.is_told, found.strafes) == (False, strafes)
 
 
-@pytest.mark.parametrize(("others", "strafes"), [(1, False), (6, True)])
-def test_a_vehicle_that_often_goes_another_way_has_no_usual_course(others, strafes):
+@pytest.mark.parametrize(
+    ("others", "mostly", "strafes"),
+    [(1, 0.9, False), (6, 0.9, True), (6, MOSTLY_ALONE, False), (9, MOSTLY_ALONE, True)],
+)
+def test_a_vehicle_that_often_goes_another_way_has_no_usual_course(others, mostly, strafes):
     courses = np.radians([50.0] * (30 - others) + [15.0] * others)
     places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
-    found = course_of(Track(10.0 * np.arange(30), np.column_stack([places, np.zeros(30)])), np.pi)
+    found = course_of(Track(10.0 * np.arange(30), np.column_stack([places, np.zeros(30)])), np.pi, mostly)
     assert (found.is_told, found.strafes) == (not strafes, strafes)
 
 
