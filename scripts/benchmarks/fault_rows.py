@@ -62,6 +62,7 @@ _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", 
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"
+_SENSELESS = "make no sense"
 _REVERSED, _ENDED = "compass counts the other way", "the last fix came|no echo came"
 _OFTEN = {"at": 60.0, "every": 60.0}
 
@@ -155,6 +156,8 @@ ROWS = (
     FaultRow("gain fades to {}", rare.gain_fades, "", "factor", 0.3, True),
     FaultRow("all ranges {} times too short", broken.range_changed, _LENGTHS, "factor", 3.28, True, others={"at": 0.0}),
     FaultRow("odometry rounded to {} m", rare.odometry_rounded, "", "metres", 0.1),
+    FaultRow("odometry of another vehicle", rare.odometry_senseless, _SENSELESS),
+    FaultRow("angles go round twice", rare.head_turns_twice, _SENSELESS),
 )  # fmt: skip
 
 

@@ -35,6 +35,19 @@ def odometry_noisy(recording: Recording, metres: float, seed: int = 1) -> Record
     return with_odometry(recording, recording.track.poses + noise)
 
 
+def odometry_senseless(recording: Recording, seed: int = 1) -> Recording:
+    """Let speeds and turns be drawn at random, as of another vehicle: up to 0.3 m/s each way and 6 deg/s."""
+    track = recording.track
+    rates = np.cumsum(np.random.RandomState(seed).normal(size=(len(track.times) - 1, 3)), axis=0)
+    rates *= np.array([0.3, 0.3, 0.1]) / np.abs(rates).max(axis=0)
+    return with_odometry(recording, integrated(track.poses[0], rates * np.diff(track.times)[:, np.newaxis]))
+
+
+def head_turns_twice(recording: Recording) -> Recording:
+    """Let reported angles go round twice while the head goes round once."""
+    return changed(recording, lambda beam, _: replace(beam, angle=2.0 * beam.angle))
+
+
 def odometry_rounded(recording: Recording, metres: float, degrees: float = 1.0) -> Recording:
     """Let positions be rounded to some metres, and headings to some degrees, as in a log of text."""
     unit = np.array([metres, metres, np.radians(degrees)])

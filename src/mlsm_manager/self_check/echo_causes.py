@@ -27,6 +27,11 @@ _NATS_MIRRORED = 30.0  # by which it must be likelier: vehicles that go ahead sh
 # nats for each scan by which it must be likelier than nothing if the simplest error is not: a bottom that was lost in a
 # marina showed wrong ones by .4, right ones had 1.3 and more.
 _EACH_SCAN = 1.0
+_TURNED_APART = [Change(float(turn), 1.0) for turn in np.radians([30, 60, 90, 120, 150, -30, -60, -90, -120, -150])]
+_COMPARED = 60  # pairs of scans: more tell nothing new
+# Of how far scans lie apart that are turned against each other. Where headings, angles or echoes make no sense, a fit
+# leaves them .86 to 1.0 times as far apart, in broken recordings in which something does .2 to .8, in unbroken ones .6.
+_NO_BETTER = 0.84
 _SIDES = tuple(Hypothesis(is_over=is_over, mirrored=mirrored) for mirrored in Mirror for is_over in (False, True))
 _AS_TOLD = "the odometry is as the echoes tell it"
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
@@ -53,12 +58,17 @@ def echo_findings(
     pairs = ScanPairs(scans, sonar_in_base, corrections)
     if not pairs.tell:
         return EchoFindings([], AS_TOLD)
-    if not any(scan.track.reports_positions for scan in scans):
-        return EchoFindings([], AS_TOLD, _suspected_changes(pairs) if pairs.honest.as_solved else ())
     honest = pairs.honest
-    best, nats = _turned(pairs, pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)]))
+    if not any(scan.track.reports_positions for scan in scans):
+        return EchoFindings(_senseless(pairs, honest), AS_TOLD, _suspected_changes(pairs) if honest.as_solved else ())
+    right = pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)])
+    best, nats = _turned(pairs, right)
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
-    if nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD):
+    is_named = nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD)
+    senseless = _senseless(pairs, best if is_named else right)
+    if senseless:
+        return EchoFindings(senseless, AS_TOLD)
+    if is_named:
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
     named = [cause for cause in carried(pairs, honest, _CARRIED)[:1] if cause.evidence > NAMED_FROM]
@@ -66,6 +76,17 @@ def echo_findings(
     suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
     found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
     return EchoFindings(ranked(found), AS_TOLD, suspected)
+
+
+def _senseless(pairs: ScanPairs, right: Hypothesis) -> List[Cause]:
+    """Return whether scans lie no better on each other than turned ones do, even if `right` is."""
+    near = pairs.near(right)
+    chosen = np.unique(np.linspace(0, len(near.pairs) - 1, _COMPARED).astype(int))
+    turned = pairs.changed(near.pairs[chosen], _TURNED_APART, right).mean(axis=1)
+    if near.distances[chosen].mean() < _NO_BETTER * np.median(turned):
+        return []
+    text = "scans lie on each other no better than if they were turned at random"
+    return [Cause(f"{text}: headings, angles of the head or echoes make no sense", CERTAIN, turn=np.pi)]
 
 
 def _turned(pairs: ScanPairs, right: Hypothesis) -> Tuple[Hypothesis, float]:

@@ -29,6 +29,7 @@ from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
+_SHORTEST = 0.05  # true over reported distances: a fit of what makes no sense may go back
 _UNLIKELY_LENGTH = np.log(1.7)  # thrusters err by a third; sonars set to half or twice the range, and feet, by more
 
 
@@ -150,8 +151,8 @@ class MotionFindings:
         model = self.run.parameters.odometry
         if SCALE not in model.calibrated.values():
             return 0.0, 1.0
-        found, expected = (float(np.log1p(node[SCALE])) for node in (self.run.state.nodes[-1], model.first_node()))
-        return found - expected, float(model.first_deviations()[SCALE])
+        found, expected = (1.0 + node[SCALE] for node in (self.run.state.nodes[-1], model.first_node()))
+        return float(np.log(max(found, _SHORTEST) / expected)), float(model.first_deviations()[SCALE])
 
     def _calibration_causes(self) -> List[Cause]:
         """Return what is unlikely of the distances, the direction and the delay that the run found."""

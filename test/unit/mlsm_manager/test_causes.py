@@ -61,6 +61,9 @@ def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on()
         (rare.compass_reversed(WHOLE, False), "the compass counts the other way, beside positions that are right"),
         (rare.compass_reversed(ASIDE, True), "the compass counts the other way, and positions are reckoned with it"),
         (rare.bottom_lost(WHOLE, MIDDLE, 40.0), "the vehicle was carried by 1"),
+        (rare.odometry_senseless(WHOLE), "scans lie on each other no better than if they were turned at random"),
+        (rare.odometry_senseless(WHOLE).without_positions(), "scans lie on each other no better than if they were"),
+        (rare.head_turns_twice(WHOLE), "scans lie on each other no better than if they were turned at random"),
     ],
 )
 def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said):
