@@ -1,5 +1,6 @@
 """Names what is wrong with mounts, stamps and head: the hypothesis under which scans lie closest to each other."""
 
+from dataclasses import replace
 from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
@@ -13,6 +14,7 @@ from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, Scan
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
 _LENGTHS = 2.0 ** np.arange(-2.0, 1.1, 0.25)  # true over reported: where these are feet, mirrored moves fit better, too
+_DELAYS = np.arange(-12.0, 13.0, 2.0)  # s
 _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
 _DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
@@ -32,6 +34,11 @@ _COMPARED = 60  # pairs of scans: more tell nothing new
 # Of how far scans lie apart that are turned against each other. Where headings, angles or echoes make no sense, a fit
 # leaves them .86 to 1.0 times as far apart, in broken recordings in which something does .2 to .8, in unbroken ones .6.
 _NO_BETTER = 0.84
+_ASTRAY = 0.25  # of the way: so far off is a path whose steps go anywhere
+_SENSELESS = Cause(
+    "scans lie on each other no better than if they were turned at random: headings, angles of the head or echoes make "
+    "no sense", CERTAIN,
+)  # fmt: skip
 _SIDES = tuple(Hypothesis(is_over=is_over, mirrored=mirrored) for mirrored in Mirror for is_over in (False, True))
 _AS_TOLD = "the odometry is as the echoes tell it"
 TURN_DEVIATION = np.radians(5.0)  # of a turn that is found so
@@ -60,14 +67,15 @@ def echo_findings(
         return EchoFindings([], AS_TOLD)
     honest = pairs.honest
     if not any(scan.track.reports_positions for scan in scans):
-        return EchoFindings(_senseless(pairs, honest), AS_TOLD, _suspected_changes(pairs) if honest.as_solved else ())
+        senseless = [_astray(_SENSELESS, pairs)] if _is_chance(pairs, honest) else []
+        return EchoFindings(senseless, AS_TOLD, _suspected_changes(pairs) if honest.as_solved else ())
     right = pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)])
     best, nats = _turned(pairs, right)
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
     is_named = nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD)
-    senseless = _senseless(pairs, best if is_named else right)
-    if senseless:
-        return EchoFindings(senseless, AS_TOLD)
+    if _is_chance(pairs, best if is_named else right):
+        delayed = [] if is_named else _delayed(pairs, honest)
+        return EchoFindings([_astray(cause, pairs) for cause in delayed or [_SENSELESS]], AS_TOLD)
     if is_named:
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
@@ -78,15 +86,17 @@ def echo_findings(
     return EchoFindings(ranked(found), AS_TOLD, suspected)
 
 
-def _senseless(pairs: ScanPairs, right: Hypothesis) -> List[Cause]:
+def _is_chance(pairs: ScanPairs, right: Hypothesis) -> bool:
     """Return whether scans lie no better on each other than turned ones do, even if `right` is."""
     near = pairs.near(right)
     chosen = np.unique(np.linspace(0, len(near.pairs) - 1, _COMPARED).astype(int))
     turned = pairs.changed(near.pairs[chosen], _TURNED_APART, right).mean(axis=1)
-    if near.distances[chosen].mean() < _NO_BETTER * np.median(turned):
-        return []
-    text = "scans lie on each other no better than if they were turned at random"
-    return [Cause(f"{text}: headings, angles of the head or echoes make no sense", CERTAIN, turn=np.pi)]
+    return bool(near.distances[chosen].mean() > _NO_BETTER * np.median(turned))
+
+
+def _astray(cause: Cause, pairs: ScanPairs) -> Cause:
+    """Return a cause for which a run may lie anywhere along its way."""
+    return replace(cause, turn=np.pi, metres=_ASTRAY * pairs.way)
 
 
 def _turned(pairs: ScanPairs, right: Hypothesis) -> Tuple[Hypothesis, float]:
@@ -162,7 +172,7 @@ def _certainly(track: Track, found: Hypothesis) -> PutRight:
 
 
 def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
-    tried = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
+    tried = around(AS_TOLD, "delay", _DELAYS)
     found = pairs.best(tried)
     nats = pairs.evidence(found, honest) - np.log(len(tried))
     if abs(found.delay) <= _DELAY_TOLD or nats < NAMED_FROM:

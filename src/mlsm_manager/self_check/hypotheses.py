@@ -133,6 +133,11 @@ class ScanPairs:
         return self.best([AS_TOLD, *around(Hypothesis(as_solved=True), "delay", _LATE)])
 
     @property
+    def way(self) -> float:
+        """How far the vehicle went by the odometry, m."""
+        return float(np.hypot(*np.diff(self._track(Mirror.NOTHING).poses[:, :2], axis=0).T).sum())
+
+    @property
     def scans(self) -> int:
         """How many scans begin a pair."""
         return len(np.unique(self.times[:, 0]))

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
-from benchmarks.faults import shortened
+from benchmarks.faults import shortened, source
 from benchmarks.harness import mapped_as
 from made_recordings import SECONDS, scans_in, strafing, touring
 from made_scans import later
@@ -68,6 +68,13 @@ def test_headings_that_tremble_are_smoothed_in_each_scan_of_a_run_that_goes_on()
 )
 def test_the_cause_is_named_under_which_scans_lie_on_each_other(recording, said):
     assert found_in(recording).causes[0].text.startswith(said)
+
+
+def test_a_run_may_lie_anywhere_where_stamps_are_so_late_that_scans_meet_by_chance():
+    (cause,) = found_in(broken.delayed(source("turning", 300.0), 12.0)).causes
+    assert cause.text.startswith("beams were sent 12 s earlier than their stamps")
+    assert cause.turn == np.pi
+    assert cause.metres > 10.0
 
 
 def test_nothing_is_named_where_nothing_is_wrong():
