@@ -130,7 +130,9 @@ class _BestPath(NamedTuple):
         """
         if end is None:
             return self
-        covariance = self.covariances[-1] + end.covariance[POSITION, POSITION] - newest
+        # Scans that told nothing may have made the place before them less certain than the live one is at the end.
+        values, axes = np.linalg.eigh(end.covariance[POSITION, POSITION] - newest)
+        covariance = self.covariances[-1] + (np.maximum(values, 0.0) * axes) @ axes.T
         return self._replace(
             times=np.append(self.times, end.time),
             places=np.append(self.places, self.poses[-1:, :2], axis=0),

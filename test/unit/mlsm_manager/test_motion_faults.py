@@ -213,6 +213,13 @@ def test_ranges_in_feet_are_named_and_how_far_off_they_lead_is_stated():
 
 
 @pytest.mark.long
+def test_how_well_the_last_place_is_known_is_a_number_where_little_is_heard():
+    right = source("harbour compass", 400.0)
+    heard = mapped_as(replace(right, beams=right.beams[::10]), "--refine")
+    assert np.isfinite(heard.findings.trust.deviations).all()
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(("tour", "seconds"), [("turning", 600.0), ("harbour", 140.0)])
 def test_what_a_turned_dvl_hides_of_a_turned_sonar_is_stated(tour, seconds):
     """A vehicle that strafes, and one that was not seen for long; their DVLs are turned by 10 degrees."""
