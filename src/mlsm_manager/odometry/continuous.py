@@ -28,14 +28,13 @@ from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import composed, move_of, seen_from, wrapped
 
 _NEXT = 0.3  # s: between two poses of a slow odometry that goes on
+_COARSE = 0.03  # m: positions that are rounded to less stand for no second while the vehicle goes
+_CHANGES, _FEWEST = 100, 6  # the newest ones along x or y, and how many tell whether positions are rounded
+_EXACT = 1e-3  # of what they are rounded to
 
 
 class Rounding:
     """Tells from the changes of positions whether these are rounded: then all are multiples of one length."""
-
-    _COARSE = 0.03  # m: positions that are rounded to less stand for no second while the vehicle goes
-    _CHANGES, _FEWEST = 100, 6  # the newest ones along x or y, and how many tell it
-    _EXACT = 1e-3  # of that length
 
     def __init__(self) -> None:
         self._changes = np.empty(0)
@@ -43,15 +42,15 @@ class Rounding:
     def learn(self, poses: np.ndarray) -> None:
         """Learn poses (m, 3) that follow each other."""
         changes = np.abs(np.diff(poses[:, :2], axis=0)).ravel()
-        self._changes = np.append(self._changes, changes[changes > 0.0])[-self._CHANGES :]
+        self._changes = np.append(self._changes, changes[changes > 0.0])[-_CHANGES:]
 
     @property
     def is_coarse(self) -> bool:
         """Whether a position that stands for seconds may be that of a vehicle that goes on."""
-        if len(self._changes) < self._FEWEST or self._changes.min() < self._COARSE:
+        if len(self._changes) < _FEWEST or self._changes.min() < _COARSE:
             return False
         multiples = self._changes / self._changes.min()
-        return bool(np.abs(multiples - np.round(multiples)).max() < self._EXACT)
+        return bool(np.abs(multiples - np.round(multiples)).max() < _EXACT)
 
 
 class ContinuousOdometry:
@@ -101,7 +100,7 @@ class ContinuousOdometry:
         self._rounding.learn(track.poses[known - 1 :])
         impossible = impossible_steps(track, self._limits).tolist()
         stalled = {stall.end: stall for stall in stalls(track, impossible, self._limits.max_speed)}
-        if self._rounding.is_coarse:
+        if stalled and self._rounding.is_coarse:
             stalled = {end: stall for end, stall in stalled.items() if stall.kind in JUMPS_AFTER_STANDING}
         for number in sorted({*impossible, *stalled}):
             if number >= known and not self._stood_until(*track.times[number - 1 : number + 1]):

@@ -32,7 +32,7 @@ _EACH_SCAN = 1.0
 _TURNED_APART = [Change(float(turn), 1.0) for turn in np.radians([30, 60, 90, 120, 150, -30, -60, -90, -120, -150])]
 _COMPARED = 60  # pairs of scans: more tell nothing new
 # Of how far scans lie apart that are turned against each other. Where headings, angles or echoes make no sense, a fit
-# leaves them .86 to 1.0 times as far apart, in broken recordings in which something does .2 to .8, in unbroken ones .6.
+# leaves them .86 to 1.0 times as far apart, in other broken recordings .2 to .8, in unbroken ones .2 to .65.
 _NO_BETTER = 0.84
 _ASTRAY = 0.25  # of the way: so far off is a path whose steps go anywhere
 _SENSELESS = Cause(
