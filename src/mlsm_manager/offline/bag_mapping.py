@@ -42,6 +42,7 @@ from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
 from mlsm_manager.self_check.fault_trials import with_other_ranges
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
+from mlsm_manager.self_check.motion_findings import assumed_of_lengths
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.surface_map.map_file import StoredMap
@@ -150,7 +151,7 @@ def _judged(
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
     findings, known = None, parameters
     if replayed.solver is not None:
-        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, heard.mounted, refined))
+        findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, heard.mounted, refined, replayed))
         known = findings.calibration.applied(parameters)
     sessions = _further_sessions(replayed, known, options)
     run = _run(replayed, refined, sessions, known, None if findings is None else findings.trust)
@@ -276,7 +277,9 @@ def _heard(
     return _Heard(mirrored, _scans(mirrored, extractor, options), mended, signs, [_OVER])
 
 
-def _assumed(odometry: OdometryFound, mended: Sequence[Cause], refined: Optional[Refined]) -> Assumption:
+def _assumed(
+    odometry: OdometryFound, mended: Sequence[Cause], refined: Optional[Refined], replayed: Replayed
+) -> Assumption:  # fmt: skip
     """Return what the path rests on though no check tells it: of the odometry, or of the sonar's mount."""
     if odometry.assumed.text:
         return odometry.assumed
@@ -285,7 +288,10 @@ def _assumed(odometry: OdometryFound, mended: Sequence[Cause], refined: Optional
     course = NOT_TOLD if refined is None else refined.motion.course
     if odometry.kind is OdometryKind.HOVERING and not course.is_told:
         return Assumption(_YAW_AS_TOLD, 0.0)
-    return NOTHING_ASSUMED
+    is_named = refined is not None and any(cause.length for cause in refined.motion.causes)
+    if odometry.kind is not OdometryKind.AUTO or is_named:
+        return NOTHING_ASSUMED
+    return assumed_of_lengths(replayed.solver.solution if refined is None else refined.solution)
 
 
 def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:

@@ -31,7 +31,7 @@ class Trust:
     if_so: float = np.nan
 
     def assuming(self, assumed: Assumption, places: np.ndarray) -> "Trust":
-        """Return that of a path that rests on what nobody measured: no check is fine, it may be turned, if not so.
+        """Return that of a path that rests on what nobody measured: no check is fine, and it lies elsewhere if not so.
 
         places: (k, 2) m, the path.
         """
@@ -39,8 +39,8 @@ class Trust:
         held = replace(self, verdicts=verdicts, assumed=assumed)
         if np.isnan(assumed.turn):
             return held
-        turned = Cause(assumed.text, CERTAIN, turn=assumed.turn)
-        if_not = widened(self.covariances, self.times, places, [turned])
+        wrong = Cause(assumed.text, CERTAIN, turn=assumed.turn, length=assumed.length)
+        if_not = widened(self.covariances, self.times, places, [wrong])
         return replace(held, covariances=if_not, if_so=float(self.deviations.max()))
 
     @property

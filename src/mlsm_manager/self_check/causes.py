@@ -74,11 +74,13 @@ def is_alike(one: Cause, other: Cause) -> bool:
 class Assumption(NamedTuple):
     """What nobody measured and the path rests on. text: one clause; empty where there is none.
 
-    turn: rad, by how much the path is turned if it is not so; NaN where nothing can be said of the position if it is.
+    turn: rad, length: relative, by how much the path is turned and too long if it is not so; turn is NaN where nothing
+    can be said of the position if it is.
     """
 
     text: str
     turn: float = np.nan
+    length: float = 0.0
 
 
 NOTHING_ASSUMED = Assumption("")

@@ -12,7 +12,7 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import Cause, is_same, unsure_length
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, is_same, unsure_length
 from mlsm_manager.self_check.course import (
     MOSTLY_ALONE,
     NAMED,
@@ -30,7 +30,26 @@ from node_support.geometry import move_of, rotated, transformed
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
 _SHORTEST = 0.05  # true over reported distances: a fit of what makes no sense may go back
+_ODD_LENGTH = np.log(1.2)  # a sonar's ranges and a DVL's distances are right to some percent
 _UNLIKELY_LENGTH = np.log(1.7)  # thrusters err by a third; sonars set to half or twice the range, and feet, by more
+
+
+def _length_found(run: Solution) -> float:
+    """Return the logarithm of true distances over reported ones, as a run found it; zero where none are reported."""
+    model = run.parameters.odometry
+    if SCALE not in model.calibrated.values():
+        return 0.0
+    found, expected = (1.0 + node[SCALE] for node in (run.state.nodes[-1], model.first_node()))
+    return float(np.log(max(found, _SHORTEST) / expected))
+
+
+def assumed_of_lengths(run: Solution) -> Assumption:
+    """Return that a run believes ranges and not distances, where it took the odometry for one that is not a DVL's."""
+    length = _length_found(run)
+    if abs(length) < _ODD_LENGTH:
+        return NOTHING_ASSUMED
+    text = f"ranges are right and not the odometry's distances, which are {np.exp(-length):.2f} times as long; "
+    return Assumption(f"{text}name the odometry if that is known", 0.0, unsure_length(length))
 
 
 @dataclass(frozen=True)
@@ -143,22 +162,14 @@ class MotionFindings:
         turn = float(self.run.state.nodes[-1, DIRECTION] - model.first_node()[DIRECTION])
         return CourseFound(-turn, float(model.first_deviations()[DIRECTION]))
 
-    @property
-    def _length(self) -> Tuple[float, float]:
-        """The logarithm of true distances over reported ones as the run found it, and the deviation of that before the
-        run; zero where none are reported.
-        """
-        model = self.run.parameters.odometry
-        if SCALE not in model.calibrated.values():
-            return 0.0, 1.0
-        found, expected = (1.0 + node[SCALE] for node in (self.run.state.nodes[-1], model.first_node()))
-        return float(np.log(max(found, _SHORTEST) / expected)), float(model.first_deviations()[SCALE])
-
     def _calibration_causes(self) -> List[Cause]:
         """Return what is unlikely of the distances, the direction and the delay that the run found."""
-        found, direction, (length, usual) = [], self._direction, self._length
+        found, direction, length = [], self._direction, _length_found(self.run)
         if abs(length) > _UNLIKELY_LENGTH:
-            fault = MotionFault(FaultKind.LENGTH, np.nan, (length,))
+            fault, usual = (
+                MotionFault(FaultKind.LENGTH, np.nan, (length,)),
+                self.run.parameters.odometry.distance_deviation,
+            )
             found.append(Cause(fault.text, 0.5 * (length / usual) ** 2, length=unsure_length(length)))
         delay, deviation = self._delay
         size = abs(delay) / deviation

@@ -213,6 +213,17 @@ def test_ranges_in_feet_are_named_and_how_far_off_they_lead_is_stated():
 
 
 @pytest.mark.long
+def test_ranges_that_are_somewhat_too_short_are_believed_only_where_the_odometry_is_named():
+    right = source("harbour", 300.0)
+    short = broken.range_changed(right, 0.0, 1.4)
+    whole, found = mapped_as(right, "--refine"), mapped_as(short, "--refine")
+    believed = "trust: NOT MEASURED: ranges are right and not the odometry's distances, which are 1."
+    assert found.findings.trust.line.startswith(believed)
+    assert outcome(found, whole, named="").covered > 0.95
+    assert "ranges" not in mapped_as(short, "--odometry", "thrusters").findings.trust.line
+
+
+@pytest.mark.long
 def test_how_well_the_last_place_is_known_is_a_number_where_little_is_heard():
     right = source("harbour compass", 400.0)
     heard = mapped_as(replace(right, beams=right.beams[::10]), "--refine")
