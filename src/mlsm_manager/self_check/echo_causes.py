@@ -14,7 +14,7 @@ from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, Scan
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
 _LENGTHS = 2.0 ** np.arange(-2.0, 1.1, 0.25)  # true over reported: where these are feet, mirrored moves fit better, too
-_DELAYS = np.arange(-12.0, 13.0, 2.0)  # s
+_DELAYED = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
 _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
 _DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
@@ -74,7 +74,7 @@ def echo_findings(
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
     is_named = nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD)
     if _is_chance(pairs, best if is_named else right):
-        delayed = [] if is_named else _delayed(pairs, honest)
+        delayed = [] if is_named or _is_chance(pairs, pairs.best(_DELAYED)) else _delayed(pairs, honest)
         return EchoFindings([_astray(cause, pairs) for cause in delayed or [_SENSELESS]], AS_TOLD)
     if is_named:
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
@@ -172,9 +172,8 @@ def _certainly(track: Track, found: Hypothesis) -> PutRight:
 
 
 def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
-    tried = around(AS_TOLD, "delay", _DELAYS)
-    found = pairs.best(tried)
-    nats = pairs.evidence(found, honest) - np.log(len(tried))
+    found = pairs.best(_DELAYED)
+    nats = pairs.evidence(found, honest) - np.log(len(_DELAYED))
     if abs(found.delay) <= _DELAY_TOLD or nats < NAMED_FROM:
         return []
     return [delay_cause(found.delay, nats)]
