@@ -29,27 +29,27 @@ from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
-_SHORTEST = 0.05  # true over reported distances: a fit of what makes no sense may go back
+_SHORTEST = 0.05  # true over reported distances: a fit of what makes no sense may go back, and tells no length
 _ODD_LENGTH = np.log(1.2)  # a sonar's ranges and a DVL's distances are right to some percent
 _UNLIKELY_LENGTH = np.log(1.7)  # thrusters err by a third; sonars set to half or twice the range, and feet, by more
 
 
 def _length_found(run: Solution) -> float:
-    """Return the logarithm of true distances over reported ones, as a run found it; zero where none are reported."""
+    """Return the logarithm of true distances over reported ones, as a run found it; zero where it tells none."""
     model = run.parameters.odometry
     if SCALE not in model.calibrated.values():
         return 0.0
     found, expected = (1.0 + node[SCALE] for node in (run.state.nodes[-1], model.first_node()))
-    return float(np.log(max(found, _SHORTEST) / expected))
+    return float(np.log(found / expected)) if found > _SHORTEST else 0.0
 
 
 def assumed_of_lengths(run: Solution) -> Assumption:
-    """Return that a run believes ranges and not distances, where it took the odometry for one that is not a DVL's."""
+    """Return that a run took the sonar's ranges for right, where the odometry's distances contradict them clearly."""
     length = _length_found(run)
     if abs(length) < _ODD_LENGTH:
         return NOTHING_ASSUMED
-    text = f"ranges are right and not the odometry's distances, which are {np.exp(-length):.2f} times as long; "
-    return Assumption(f"{text}name the odometry if that is known", 0.0, unsure_length(length))
+    text = f"the sonar's ranges are right, although the odometry's distances are {np.exp(-length):.2f} times as long"
+    return Assumption(f"{text} (name the odometry to decide)", 0.0, unsure_length(length))
 
 
 @dataclass(frozen=True)

@@ -217,7 +217,7 @@ def test_ranges_that_are_somewhat_too_short_are_believed_only_where_the_odometry
     right = source("harbour", 300.0)
     short = broken.range_changed(right, 0.0, 1.4)
     whole, found = mapped_as(right, "--refine"), mapped_as(short, "--refine")
-    believed = "trust: NOT MEASURED: ranges are right and not the odometry's distances, which are 1."
+    believed = "trust: NOT MEASURED: the sonar's ranges are right, although the odometry's distances are 1."
     assert found.findings.trust.line.startswith(believed)
     assert outcome(found, whole, named="").covered > 0.95
     assert "ranges" not in mapped_as(short, "--odometry", "thrusters").findings.trust.line
