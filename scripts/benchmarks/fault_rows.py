@@ -58,7 +58,7 @@ def _other(row: FaultRow, factor: float) -> float:
 
 
 _JUMPED, _STEPPED, _SLIPPED = "odometry jumped", "compass stepped", "head slipped|compass stepped"
-_FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "reported distances", "compass drifts"
+_FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "distances are", "compass drifts"
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"
 _STOOD, _ARM, _GAIN, _BLIND = "head stood", "the sonar sits", "gain|range setting", "hears nothing"

@@ -2,7 +2,8 @@
 
 Each row: the recording and the fault; distance [m] from the path of the unbroken recording, in the mean of the live and
 the refined path, and the refined one's largest; "stated": median of the stated deviation [m]; "covered": share of the
-refined path within 2.5 of these; the cause that is named first, with the second that it names; the trust line.
+refined path within 2.5 of these; the cause that is named first, with the second that it names, or what
+is assumed; the trust line.
 A row is "held" where the refined path is off by no more than the unbroken run's stated deviation; else "SILENT" where
 its checks are called fine, "named, covered" where the right cause is named first and 95 % of the path are within 2.5
 stated deviations, and "missed" where not.
@@ -119,7 +120,9 @@ def outcome(found: MappedBag, whole: MappedBag, named: str) -> Outcome:
 
 
 def _first_cause(trust: Trust) -> str:
-    return trust.causes[0].line(float(trust.times[0])) if trust.causes else "-"
+    if trust.causes:
+        return trust.causes[0].line(float(trust.times[0]))
+    return trust.assumed.text or "-"
 
 
 def fault_parser(name: str, about: str) -> ArgumentParser:

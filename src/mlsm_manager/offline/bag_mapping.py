@@ -36,13 +36,13 @@ from mlsm_manager.offline.suited_parameters import (
 from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes, ranges_are_told
-from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, Fault, Suspicion
+from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault, Suspicion
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD, moves_are_turned
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, put_right, turn_text
 from mlsm_manager.self_check.fault_trials import with_other_ranges
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
-from mlsm_manager.self_check.motion_findings import assumed_of_lengths
+from mlsm_manager.self_check.lengths import assumed_of_lengths
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.surface_map.map_file import StoredMap
@@ -288,10 +288,7 @@ def _assumed(
     course = NOT_TOLD if refined is None else refined.motion.course
     if odometry.kind is OdometryKind.HOVERING and not course.is_told:
         return Assumption(_YAW_AS_TOLD, 0.0)
-    is_named = refined is not None and any(cause.length for cause in refined.motion.causes)
-    if odometry.kind is not OdometryKind.AUTO or is_named:
-        return NOTHING_ASSUMED
-    return assumed_of_lengths(replayed.solver.solution if refined is None else refined.solution)
+    return assumed_of_lengths(replayed.solver.solution) if refined is None else refined.motion.assumed
 
 
 def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -> List[Scan]:

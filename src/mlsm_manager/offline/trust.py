@@ -6,11 +6,13 @@ from typing import Any, Dict, List, NamedTuple, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.report.mission import Uncertainty
-from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, widened
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, widened
 from mlsm_manager.self_check.path_checks import per_minute
 from mlsm_manager.self_check.verdict import FEWEST_MATCHED, Answer, RunAnswer, Verdict, too_few
 
 WITHIN = float(np.sqrt(-2.0 * np.log(0.05) / 2.0))  # radius that holds 95 %, over the root of both variances' sum
+
+_MATTERS = 1.2  # times as large a deviation: less is not worth a doubt
 
 
 @dataclass(frozen=True)
@@ -33,15 +35,17 @@ class Trust:
     def assuming(self, assumed: Assumption, places: np.ndarray) -> "Trust":
         """Return that of a path that rests on what nobody measured: no check is fine, and it lies elsewhere if not so.
 
-        places: (k, 2) m, the path.
+        places: (k, 2) m, the path. Lengths with which it lies hardly elsewhere are not told.
         """
         verdicts = [verdict.assuming(assumed.text) for verdict in self.verdicts]
         held = replace(self, verdicts=verdicts, assumed=assumed)
         if np.isnan(assumed.turn):
             return held
-        wrong = Cause(assumed.text, CERTAIN, turn=assumed.turn, length=assumed.length)
-        if_not = widened(self.covariances, self.times, places, [wrong])
-        return replace(held, covariances=if_not, if_so=float(self.deviations.max()))
+        if_not = replace(self, covariances=widened(self.covariances, self.times, places, [assumed.if_not]))
+        if_so = float(self.deviations.max())
+        if assumed.length and if_not.deviations.max() < _MATTERS * if_so:
+            return if_not
+        return replace(held, covariances=if_not.covariances, if_so=if_so)
 
     @property
     def answer(self) -> RunAnswer:

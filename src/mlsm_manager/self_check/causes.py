@@ -82,6 +82,11 @@ class Assumption(NamedTuple):
     turn: float = np.nan
     length: float = 0.0
 
+    @property
+    def if_not(self) -> Cause:
+        """What is wrong if it is not so."""
+        return Cause(self.text, CERTAIN, turn=self.turn, length=self.length)
+
 
 NOTHING_ASSUMED = Assumption("")
 

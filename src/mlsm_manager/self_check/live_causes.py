@@ -14,7 +14,17 @@ from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.beam_causes import head_causes
-from mlsm_manager.self_check.causes import Cause, Fault, Suspicion, is_alike, of_steps, of_stuck, ranked, widened
+from mlsm_manager.self_check.causes import (
+    NOTHING_ASSUMED,
+    Cause,
+    Fault,
+    Suspicion,
+    is_alike,
+    of_steps,
+    of_stuck,
+    ranked,
+    widened,
+)
 from mlsm_manager.self_check.course import NOT_TOLD, CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import without_faults
@@ -54,7 +64,7 @@ class LiveCauses:
             self._found: List[Cause] = []
             self._shown: List[Cause] = []
             self._spread, self.by_mounts = np.zeros((2, 2)), 0.0
-            self._course = NOT_TOLD
+            self._course, self._assumed = NOT_TOLD, NOTHING_ASSUMED
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
@@ -105,7 +115,7 @@ class LiveCauses:
         of_head = [*of_standing(self._head_stood(beams)), *head_causes(beams)]
         of_beams = [*of_head, *standing_causes(scans, track, path)]
         spread, by_mounts = np.zeros((2, 2)), 0.0
-        course = self._course
+        course, assumed = self._course, self._assumed
         found = [*of_echoes, *of_beams]
         run = newest_run()
         if run is not None:
@@ -115,12 +125,12 @@ class LiveCauses:
             suspected = [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])]
             motion = _motion_of(run, suspected, track.with_poses(path), begin, course)
             found, by_mounts, course = motion.told_with(of_echoes, of_beams), motion.by_mounts, motion.course
-            spread = motion.spread(run.log.node_times[-1:])[0]
+            spread, assumed = motion.spread(run.log.node_times[-1:])[0], motion.assumed
         found += [of_stuck(*one) for one in stuck_headings(track)]
         with self._lock:
             if self._places is places:
                 self._learn(found, spread, by_mounts, scans[0].start)
-                self._course = course
+                self._course, self._assumed = course, assumed
 
     def _head_stood(self, beams: Sequence[Beam]) -> List[HeadStood]:
         """Return when the head stood, of some beams; if in all of them, earlier ones tell that it turned."""
@@ -150,10 +160,10 @@ class LiveCauses:
         """Return what the causes add to the covariance (2, 2) [m^2] of the newest place."""
         with self._lock:
             spread = self._spread
-            if not self._places or not (steps or self._found):
+            causes = [*self.causes(steps), *([self._assumed.if_not] if self._assumed.text else ())]
+            if not self._places or not causes:
                 return spread
             places = np.array(self._places)
-        causes = self.causes(steps)
         return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
 
 

@@ -6,13 +6,12 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult
-from mlsm_manager.joint_solver.motion_models import DIRECTION, SCALE
+from mlsm_manager.joint_solver.motion_models import DIRECTION
 from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
-from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, is_same, unsure_length
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, is_same
 from mlsm_manager.self_check.course import (
     MOSTLY_ALONE,
     NAMED,
@@ -25,31 +24,11 @@ from mlsm_manager.self_check.course import (
 )
 from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
+from mlsm_manager.self_check.lengths import assumed_of_lengths, length_causes
 from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
-_SHORTEST = 0.05  # true over reported distances: a fit of what makes no sense may go back, and tells no length
-_ODD_LENGTH = np.log(1.2)  # a sonar's ranges and a DVL's distances are right to some percent
-_UNLIKELY_LENGTH = np.log(1.7)  # thrusters err by a third; sonars set to half or twice the range, and feet, by more
-
-
-def _length_found(run: Solution) -> float:
-    """Return the logarithm of true distances over reported ones, as a run found it; zero where it tells none."""
-    model = run.parameters.odometry
-    if SCALE not in model.calibrated.values():
-        return 0.0
-    found, expected = (1.0 + node[SCALE] for node in (run.state.nodes[-1], model.first_node()))
-    return float(np.log(found / expected)) if found > _SHORTEST else 0.0
-
-
-def assumed_of_lengths(run: Solution) -> Assumption:
-    """Return that a run took the sonar's ranges for right, where the odometry's distances contradict them clearly."""
-    length = _length_found(run)
-    if abs(length) < _ODD_LENGTH:
-        return NOTHING_ASSUMED
-    text = f"the sonar's ranges are right, although the odometry's distances are {np.exp(-length):.2f} times as long"
-    return Assumption(f"{text} (name the odometry to decide)", 0.0, unsure_length(length))
 
 
 @dataclass(frozen=True)
@@ -59,7 +38,8 @@ class MotionFindings:
     run: fitted as `fit` says, which belongs to the odometry `track`. causes: of what is wrong with the reported one, or
     with the sonar. apart: (n, 2) m each, how far other paths that the run may have gone lie beside this one at its
     nodes. course: how the sonar is turned by the vehicle's usual one. mounts: rad, by how much it may be where none
-    tells it. by_mounts: m, how far that turns the newest place about the place where the run began.
+    tells it. by_mounts: m, how far that turns the newest place about the place where the run began. assumed: which
+    lengths are right, where those of sonar and odometry contradict each other and no cause says so.
     """
 
     run: Solution
@@ -70,6 +50,7 @@ class MotionFindings:
     course: CourseFound = NOT_TOLD
     mounts: float = 0.0
     by_mounts: float = 0.0
+    assumed: Assumption = NOTHING_ASSUMED
 
     @property
     def is_alone(self) -> bool:
@@ -129,7 +110,9 @@ class MotionFindings:
         causes = [*self.causes, *(causes or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
         by_mounts = mounts * float(np.hypot(*gone[-1]))
-        return replace(self, causes=causes, apart=apart, course=course, mounts=mounts, by_mounts=by_mounts)
+        assumed = NOTHING_ASSUMED if any(cause.length for cause in causes) else assumed_of_lengths(self.run)
+        found = replace(self, causes=causes, apart=apart, course=course, assumed=assumed)
+        return replace(found, mounts=mounts, by_mounts=by_mounts)
 
     def _course_of(self, path: Track) -> CourseFound:
         if self.is_alone:  # nothing else tells a turn of the sonar, however large it is
@@ -163,14 +146,8 @@ class MotionFindings:
         return CourseFound(-turn, float(model.first_deviations()[DIRECTION]))
 
     def _calibration_causes(self) -> List[Cause]:
-        """Return what is unlikely of the distances, the direction and the delay that the run found."""
-        found, direction, length = [], self._direction, _length_found(self.run)
-        if abs(length) > _UNLIKELY_LENGTH:
-            fault, usual = (
-                MotionFault(FaultKind.LENGTH, np.nan, (length,)),
-                self.run.parameters.odometry.distance_deviation,
-            )
-            found.append(Cause(fault.text, 0.5 * (length / usual) ** 2, length=unsure_length(length)))
+        """Return what is unlikely of the lengths, the direction and the delay that the run found."""
+        found, direction = length_causes(self.run), self._direction
         delay, deviation = self._delay
         size = abs(delay) / deviation
         if size > _UNLIKELY_DELAY:

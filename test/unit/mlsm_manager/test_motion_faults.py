@@ -224,6 +224,32 @@ def test_ranges_that_are_somewhat_too_short_are_believed_only_where_the_odometry
 
 
 @pytest.mark.long
+@pytest.mark.parametrize(
+    ("factor", "assumed"), [(1.0, ""), (1.15, "the odometry's distances are right, although the s")]
+)
+def test_a_dvl_is_believed_where_the_ranges_contradict_it_and_that_is_stated(factor, assumed):
+    short = broken.range_changed(source("harbour", 300.0), 0.0, factor)
+    found = mapped_as(short, "--refine", "--odometry", "dvl")
+    motion, stated = found.refined.motion, found.findings.trust.covariances[-1]
+    assert motion.assumed.text[:50] == assumed
+    assert (np.trace(stated) > np.trace(motion.fit.pose_covariances[-1, :2, :2]) + 0.1) == bool(assumed)  # m^2
+
+
+@pytest.mark.long
+def test_where_ranges_contradict_a_dvl_the_position_is_less_known_while_the_run_goes_on_too():
+    parameters = ReplayParameters().changed(profile_values(OdometryKind.DVL))
+    right = source("harbour", 300.0)
+    added = []
+    for recording in (right, broken.range_changed(right, 0.0, 1.15)):
+        localiser = parameters.build_localiser(recording.sonar_in_base)
+        for scan in scans_in(recording, parameters.echoes()):
+            localiser.take_scan(scan)
+        localiser.look_for_causes()
+        added.append(np.trace(localiser.following.found.covariance([])))
+    assert added[0] < 0.1 < added[1]  # m^2
+
+
+@pytest.mark.long
 def test_how_well_the_last_place_is_known_is_a_number_where_little_is_heard():
     right = source("harbour compass", 400.0)
     heard = mapped_as(replace(right, beams=right.beams[::10]), "--refine")

@@ -19,7 +19,7 @@ from mlsm_manager.offline.replay import CORRECTED, ODOMETRY, ReplayParameters, r
 from mlsm_manager.offline.run_files import Run, errors_of, position_error, write_run, write_summary, write_trajectory
 from mlsm_manager.offline.trust import KnownPlaces, Trust
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import Assumption, Cause
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause
 from mlsm_manager.self_check.verdict import Answer, RunAnswer, Verdict
 from mlsm_manager.surface_map.map_file import Layer, StoredMap, read_map
 from node_support.errors import RefusedInput
@@ -112,6 +112,7 @@ def test_a_summary_that_cannot_be_written_leaves_the_old_one(tmp_path):
 FINE = Verdict("depth", 0.5, 1.0, "m")
 FIRING = Verdict("width", 2.0, 1.0, "too wide (2 m)", doubtful=np.array([[3.0, 9.0]]))
 SHORT = Verdict("length", np.nan, 1.0, "m")
+LENGTHS = Assumption("ranges are right", 0.0, 0.05)
 _FEW = ", faults show from 7 scans on"
 
 
@@ -171,6 +172,13 @@ def test_of_an_odometry_that_was_put_right_is_said_how_well_the_position_is_know
     trust = replace(trust_of(*verdicts), assumed=Assumption("it was turned"), if_so=if_so)
     assert trust.line == f"trust: NOT MEASURED: it was turned; {known}"
     assert trust.uncertainty is not None
+
+
+@pytest.mark.parametrize(("gone", "assumed"), [(20.0, NOTHING_ASSUMED), (80.0, LENGTHS)])
+def test_lengths_that_nobody_measured_are_told_where_the_position_depends_on_them(gone, assumed):
+    trust = trust_of(FINE).assuming(LENGTHS, np.array([[0.0, 0.0], [gone / 2.0, 0.0], [gone, 0.0]]))
+    assert trust.assumed == assumed
+    assert trust.deviations[-1] > trust_of(FINE).deviations[-1]
 
 
 def test_nothing_is_said_of_the_position_by_an_assumption_where_no_check_had_enough_data():
