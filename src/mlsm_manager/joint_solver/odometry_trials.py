@@ -59,6 +59,13 @@ def fit_with(run: Solution, track: Track, stretch: Optional[Tuple[float, float]]
     return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
 
 
+def fit_reported(run: Solution, track: Track) -> BatchResult:
+    """Return the fit of a run if its odometry had reported `track`, from there on: where the run is may be far off."""
+    log, model = run.log.since(0, OdometryLog.of(track)), run.parameters.odometry
+    nodes = np.tile(model.first_node(), (len(run.state.nodes), 1))
+    return fit_of(replace(run, log=log, state=State(nodes, run.parameters.run_mean(log))))
+
+
 def fit_turned(run: Solution, track: Track) -> BatchResult:
     """Return the fit of a run if its odometry had reported `track`, whose headings are others.
 

@@ -21,6 +21,7 @@ class FaultKind(Enum):
     DRIFT = "the compass drifts"
     STEP = "the compass stepped"
     SLIP = "the head slipped"
+    SLIPS_ON = "the head slips all the time"
     CIRCLE = "the compass errs by the heading"
     LENGTH = "all reported distances are wrong"
     DISTANCES = "reported distances changed"
@@ -32,6 +33,8 @@ class FaultKind(Enum):
 OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
 # That pairs of scans or headings show.
 _SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK, FaultKind.RIGHT)
+OF_HEAD = (FaultKind.SLIP, FaultKind.SLIPS_ON)
+_GROWING = (FaultKind.DRIFT, FaultKind.SLIPS_ON)
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 
 
@@ -63,8 +66,10 @@ class MotionFault:
             factor = float(np.exp(-self.sizes[0]))
             ranges = f", or reported ranges {1.0 / factor:.2f} times" if self.kind is FaultKind.LENGTH else ""
             return f"reported distances are {factor:.2f} times the true ones{ranges}"
-        if self.kind is FaultKind.DRIFT:
-            return f"the compass drifts by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
+        if self.kind in _GROWING:
+            rate = f"by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
+            slips = f"the head slipped {rate}, or the compass drifts beside positions that are right,"
+            return slips if self.kind is FaultKind.SLIPS_ON else f"the compass drifts {rate}"
         if self.kind is FaultKind.RIGHT:
             return f"the compass stepped by {np.degrees(self.sizes[0]):.0f} deg beside positions that are right,"
         if self.kind in (FaultKind.STEP, FaultKind.SLIP):
@@ -78,7 +83,7 @@ class MotionFault:
         """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
         if self.kind in (FaultKind.CARRIED, FaultKind.STUCK, FaultKind.RIGHT):
             return True
-        size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind is FaultKind.DRIFT else 1.0)
+        size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind in _GROWING else 1.0)
         return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
 
     def mended(self, track: Track) -> Track:
@@ -97,7 +102,7 @@ class MotionFault:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])
             return track.with_poses(integrated(track.poses[0], steps))
         yaws = track.poses[:, 2] + errors
-        if self.kind is FaultKind.SLIP:
+        if self.kind in OF_HEAD:
             return track.with_poses(np.column_stack([track.poses[:, :2], yaws]))
         steps[:, 2] = np.diff(yaws)
         return track.with_poses(integrated(np.append(track.poses[0, :2], yaws[0]), steps))
@@ -152,14 +157,19 @@ def with_headings_reversed(track: Track, are_reckoned: bool) -> Track:
     return track.with_poses(integrated(poses[0], steps))
 
 
+def _since(times: np.ndarray, _: np.ndarray, begin: float) -> np.ndarray:
+    return np.maximum(times - begin, 0.0)[:, np.newaxis]
+
+
 def _after(times: np.ndarray, _: np.ndarray, begin: float) -> np.ndarray:
     return (times > begin).astype(float)[:, np.newaxis]
 
 
 _COLUMNS: Dict[FaultKind, Callable[[np.ndarray, np.ndarray, float], np.ndarray]] = {
-    FaultKind.DRIFT: lambda times, _, begin: np.maximum(times - begin, 0.0)[:, np.newaxis],
+    FaultKind.DRIFT: _since,
     FaultKind.STEP: _after,
     FaultKind.SLIP: _after,
+    FaultKind.SLIPS_ON: _since,
     FaultKind.LENGTH: lambda times, _, __: np.ones((len(times), 1)),
     FaultKind.DISTANCES: _after,
     FaultKind.CIRCLE: lambda _, yaws, __: harmonics(yaws),
@@ -186,7 +196,7 @@ def likely_faults(times: np.ndarray, yaws: np.ndarray, headings: np.ndarray, sca
 def _begins(times: np.ndarray, kind: FaultKind) -> np.ndarray:
     if kind in _ALL_ALONG:
         return np.array([np.nan])
-    first, last = np.quantile(times, [0.0 if kind is FaultKind.DRIFT else _SIDE, 1.0 - _SIDE])
+    first, last = np.quantile(times, [0.0 if kind in _GROWING else _SIDE, 1.0 - _SIDE])
     return times[(times >= first) & (times <= last)]
 
 

@@ -23,6 +23,8 @@ _SWAPPED = np.radians(30.0)  # from 90 deg: a vehicle that goes ahead does not t
 _SLIPS = [Change(float(turn), 1.0) for turn in np.radians(np.arange(-60.0, 61.0, 4.0))]
 _RANGES = [Change(0.0, float(factor)) for factor in 2.0 ** (np.arange(-7.0, 8.0) / 5.0) if factor != 1.0]
 _FARTHER = 1.15  # times as far as scans lay apart before: less is no reason to look for a slip
+_ASIDE = np.radians(np.arange(-12.0, 13.0, 3.0))  # by which a DVL is mounted beside a sonar, by eye
+_RATES, _FINE_RATES = np.radians(np.arange(-12.0, 13.0)) / 60.0, np.radians(np.arange(-0.75, 1.0, 0.25)) / 60.0
 _CARRIED = 1.3  # times as far as usual: less is no reason to name a current by pairs alone
 _FEWEST_SLIPPED, _FEWEST_BEFORE = 3, 6  # pairs of scans between which the head slipped, and before it did
 _NATS_MIRRORED = 30.0  # by which it must be likelier: vehicles that go ahead show wrong ones by 7, others right by 60
@@ -72,8 +74,10 @@ def echo_findings(
     right = pairs.best([honest, *around(AS_TOLD, "scale", _LENGTHS)])
     best, nats = _turned(pairs, right)
     is_flipped = best.is_over or best.mirrored is not Mirror.NOTHING
-    is_named = nats > NAMED_FROM and (is_flipped or abs(best.turn) > _TURN_TOLD)
-    if _is_chance(pairs, best if is_named else right):
+    slipping = _slipping(pairs)
+    is_turned = is_flipped or abs(best.turn) > _TURN_TOLD
+    is_named = is_turned and nats > NAMED_FROM and pairs.evidence(best, slipping) > 0.0
+    if _is_chance(pairs, best if is_named else pairs.best([right, slipping])):
         delayed = [] if is_named or _is_chance(pairs, pairs.best(_DELAYED)) else _delayed(pairs, honest)
         return EchoFindings([_astray(cause, pairs) for cause in delayed or [_SENSELESS]], AS_TOLD)
     if is_named:
@@ -83,7 +87,7 @@ def echo_findings(
     # A path that gave way to a current hides it: it is suspected of the odometry itself.
     suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
     found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
-    return EchoFindings(ranked(found), AS_TOLD, suspected)
+    return EchoFindings(ranked(found), AS_TOLD, [*suspected, *_suspected_slips(pairs, slipping)])
 
 
 def _is_chance(pairs: ScanPairs, right: Hypothesis) -> bool:
@@ -225,6 +229,24 @@ def _suspected_changes(pairs: ScanPairs) -> List[Fault]:
     farther, nearer = ([one for one in ranges if (one.change.ranges > 1.0) is more] for more in (True, False))
     kinds = (sorted(kind, key=lambda one: -one.nats)[:1] for kind in (slips, farther, nearer))
     return [_fault_of(one.change, one.begin) for kind in kinds for one in kind]
+
+
+def _slipping(pairs: ScanPairs) -> Hypothesis:
+    """Return the likeliest of a head that slips all the time, beside a DVL that is turned a little.
+
+    The odometry's path is asked: a run that took the head's angles for right may be bent by them.
+    """
+    found = pairs.best(around(AS_TOLD, "slips", _RATES))
+    found = pairs.best(around(found, "turn", _ASIDE))
+    return pairs.best(around(found, "slips", found.slips + _FINE_RATES))
+
+
+def _suspected_slips(pairs: ScanPairs, slipping: Hypothesis) -> List[Fault]:
+    """Return that the head slips all the time, where pairs of scans lie closer to each other if it does."""
+    right = pairs.best(around(AS_TOLD, "turn", _ASIDE))
+    if not slipping.slips or pairs.evidence(slipping, right) < NAMED_FROM:
+        return []
+    return [MotionFault(FaultKind.SLIPS_ON, float(pairs.times[0, 0]), (slipping.slips,))]
 
 
 def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis) -> List[_Changed]:

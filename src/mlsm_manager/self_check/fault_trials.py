@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_turned, fit_with, freed_errors
+from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_reported, fit_turned, fit_with, freed_errors
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import (
     SonarFault,
@@ -41,6 +41,7 @@ _NATS_CIRCLE, _LARGE_CIRCLE = 20.0, np.radians(5.0)
 _NATS_SMALL, _SMALL_CHANGE = 50.0, np.log(1.2)
 _SIZED = (FaultKind.CARRIED, FaultKind.RIGHT)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
+_ABOUT = (0.8, 0.9, 1.1, 1.2)  # times what pairs of scans show of a head that slips all the time
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
 _SECONDS = (-8.0, -4.0, 4.0, 8.0)  # from when a change is suspected: it may come in the midst of a scan
 _ROUNDS = 2
@@ -121,7 +122,7 @@ def _likely(errors: OdometryErrors) -> List[Fault]:
         return []
     found = likely_faults(errors.times, errors.yaws, errors.headings, errors.scales)
     if not errors.scales.any():
-        return [fault for fault in found if fault.kind not in OF_DISTANCES]
+        return [fault for fault in found if fault.kind not in (*OF_DISTANCES, FaultKind.SLIPS_ON)]
     changed = next(one for one in found if one.kind is FaultKind.DISTANCES)
     number = int(np.searchsorted(errors.times, changed.begin))
     begins = errors.times[max(number - _EARLIER, 1) : number + _LATER]
@@ -201,6 +202,8 @@ def _beside(fault: Fault) -> List[Fault]:
         return [replace(fault, sizes=(fault.sizes[0] + turn,)) for turn in (-_TURNED / 3.0, _TURNED / 3.0)]
     if fault.kind in _SIZED:
         return []
+    if fault.kind is FaultKind.SLIPS_ON:
+        return [fault.times(factor) for factor in _ABOUT]
     if not isinstance(fault, SonarFault):
         return [fault.times(factor) for factor in _LARGER]
     others = [fault.times(factor) for factor in _BESIDE]
@@ -220,6 +223,8 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
     turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)
     fit = fit_turned(run, track) if turns else fit_with(run, track, span)
+    if fault.kind is FaultKind.SLIPS_ON:
+        fit = max(fit, fit_reported(run, track), key=lambda one: one.log_likelihood)
     run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
     gain = fit.log_likelihood - found.fit.log_likelihood
     if fault.kind is FaultKind.STUCK:

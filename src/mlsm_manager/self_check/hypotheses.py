@@ -32,7 +32,8 @@ class Hypothesis:
 
     mirrored: of what the odometry reports, but not its headings; if the sonar is_over as well, these are instead.
     ahead, aside: m, of the sonar's true place from that in tf. scale: true over reported distances. delay: s by which
-    beams are later than their stamps. as_solved: the vehicle went as the solver found it, not as the odometry says.
+    beams are later than their stamps. slips: rad/s, by which a head's angles have to grow besides what it reports.
+    as_solved: the vehicle went as the solver found it, not as the odometry says.
     """
 
     turn: float = 0.0
@@ -42,6 +43,7 @@ class Hypothesis:
     aside: float = 0.0
     scale: float = 1.0
     delay: float = 0.0
+    slips: float = 0.0
     as_solved: bool = False
 
 
@@ -102,13 +104,16 @@ class ScanPairs:
     def _placed(self, number: int, hypothesis: Hypothesis, ranges: float = 1.0) -> np.ndarray:
         """Return where echoes (n, 2) [m] of a scan are, with `ranges` times their distances from the sonar."""
         signs = np.array([1.0, -1.0 if hypothesis.is_over else 1.0])
-        mount = np.array([self._sonar[0] + hypothesis.ahead, self._sonar[1] + hypothesis.aside, hypothesis.turn])
-        in_base = transformed(mount, ranges * signs * self._heard[number].points)
+        points, times = self._heard[number]
+        mounts = np.tile([*self._sonar, hypothesis.turn], (len(times), 1))
+        mounts += np.array([hypothesis.ahead, hypothesis.aside, 0.0])
+        mounts[:, 2] += hypothesis.slips * (times - self._heard[0].times[0])
+        in_base = transformed(mounts, ranges * signs * points)
         return transformed(self._poses(number, hypothesis), in_base)
 
     def _poses(self, number: int, hypothesis: Hypothesis) -> np.ndarray:
         """Return where the vehicle was at each echo (n, 3) of a scan; mounts change nothing of it."""
-        went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0)
+        went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0, slips=0.0)
         if (number, went) not in self._ways:
             times = self._heard[number].times + went.delay
             poses = self._track(went.mirrored).at(times) * [went.scale, went.scale, 1.0]

@@ -35,6 +35,7 @@ NODES = np.arange(START, TWICE_ROUND.track.times[-1], 10.0)
 
 DRIFT = MotionFault(FaultKind.DRIFT, START + 100.0, (-0.001,))
 STEP = MotionFault(FaultKind.STEP, START + 100.0, (0.2,))
+SLIPS_ON = MotionFault(FaultKind.SLIPS_ON, START + 50.0, (-0.001,))
 CIRCLE = MotionFault(FaultKind.CIRCLE, np.nan, (0.02, 0.1, -0.05, 0.03))
 LENGTH = MotionFault(FaultKind.LENGTH, np.nan, (0.1,))
 DISTANCES = MotionFault(FaultKind.DISTANCES, START + 100.0, (-0.4,))
@@ -43,7 +44,7 @@ STUCK = MotionFault(FaultKind.STUCK, START + 100.0, (0.5,), START + 120.0)
 RIGHT = MotionFault(FaultKind.RIGHT, START + 100.0, (0.5,))
 
 
-@pytest.mark.parametrize("fault", [DRIFT, STEP, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
+@pytest.mark.parametrize("fault", [DRIFT, STEP, SLIPS_ON, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
 def test_a_fault_is_found_from_what_mends_it(fault):
     track = TWICE_ROUND.track
     yaws, mended = track.at(NODES)[:, 2], fault.mended(track)
@@ -60,6 +61,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
     [
         (DRIFT, "the compass drifts by +3.4 deg per minute"),
         (STEP, "the head slipped by 11 deg, or the compass stepped,"),
+        (SLIPS_ON, "the head slipped by +3.4 deg per minute, or the compass drifts beside positions that are right,"),
         (LENGTH, "reported distances are 0.90 times the true ones, or reported ranges 1.11 times"),
         (DISTANCES, "reported distances are 1.49 times the true ones"),
         (CARRIED, "the vehicle was carried by 10 m in 20 s, which the odometry did not feel,"),
@@ -247,6 +249,14 @@ def test_where_ranges_contradict_a_dvl_the_position_is_less_known_while_the_run_
         localiser.look_for_causes()
         added.append(np.trace(localiser.following.found.covariance([])))
     assert added[0] < 0.1 < added[1]  # m^2
+
+
+@pytest.mark.long
+def test_a_head_that_slips_all_the_time_is_named_and_the_path_fitted_without_it():
+    right = source("harbour", 400.0)
+    whole, found = (mapped_as(one, "--refine") for one in (right, broken.head_slips(right, 30.0, 4.0, every=60.0)))
+    assert_named_first(found.findings, "the head slipped by +")
+    assert outcome(found, whole, named="").refined < 1.0  # m; 3 without
 
 
 @pytest.mark.long
