@@ -7,7 +7,6 @@ import numpy as np
 
 from mlsm_manager.joint_solver.motion_models import DRIFT_SCALE, Drift
 from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS
-from mlsm_manager.joint_solver.odometry_log import as_complex
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 
 
@@ -15,8 +14,8 @@ from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 class LiveEstimate:
     """Known from the scan that ended at `time` [s] and those before it.
 
-    T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. T_map_odom: (3,) the correction. node: (width,)
-    the newest node's unknowns. run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
+    T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. node: (width,) the newest node's unknowns.
+    run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
     own_covariance: the same if the frozen map had no error. reported_velocity: (3,) m/s, m/s, rad/s that the odometry
     reported in base_link. drift: how the true motion differs from it.
     world_scale_deviation: of all lengths. comparisons: number of the scan's points that were compared with others.
@@ -30,7 +29,6 @@ class LiveEstimate:
     time: float
     T_odom_base: np.ndarray
     T_map_base: np.ndarray
-    T_map_odom: np.ndarray
     node: np.ndarray
     run: np.ndarray
     covariance: np.ndarray
@@ -74,13 +72,13 @@ class LiveEstimate:
     @property
     def velocity(self) -> np.ndarray:
         """(3,) of the vehicle in base_link, m/s, m/s, rad/s."""
-        moved = self._gain * as_complex(self.reported_velocity)
+        moved = self._gain * complex(*self.reported_velocity[:2])
         return np.array([moved.real, moved.imag, self.reported_velocity[2]]) + self.drift.values[:3]
 
     @property
     def velocity_covariance(self) -> np.ndarray:
         """(3, 3) of `velocity`: what the unknowns of the newest node leave open, without noise of what is reported."""
-        reported = as_complex(self.reported_velocity)
+        reported = complex(*self.reported_velocity[:2])
         by_gain = np.exp(1j * self.drift.values[4]) * reported
         by_direction = 1j * self._gain * reported
         by_drift = np.eye(3, len(self.drift.values))

@@ -37,7 +37,6 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.weak_directions import across_weak
-from node_support.geometry import move_of
 
 _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
 _FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
@@ -57,32 +56,45 @@ class FrozenMap:
 
     importance: (n,) factor of each point's weight, 0 at the border of what is near.
     numbers: (b,) the groups that are near, in the order of time. group_importance: (b,) the factor of each.
+    group_scans: in each group, the first of which begins with the run.
     """
 
     points: PlacedPoints
     importance: np.ndarray
     numbers: np.ndarray
     group_importance: np.ndarray
+    group_scans: int
     run: np.ndarray
+
+    @property
+    def scans(self) -> np.ndarray:
+        """(b, group_scans) int, the scans of each group that is near."""
+        return _scans_of(self.numbers, self.group_scans)
 
     def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
         """Return the points with the run's unknowns at `run` (2,), to first order."""
         return replace(self.points, places=self.points.places + self.points.by_run @ (run - self.run))
 
 
-def nearest_groups(solution: Solution, count: int, place_now: np.ndarray) -> FrozenMap:
-    """Return the groups of scans nearest to `place_now` (2,) among the first `count` groups of the run."""
+def _scans_of(groups: np.ndarray, group_scans: int) -> np.ndarray:
+    return groups[:, np.newaxis] * group_scans + np.arange(group_scans)
+
+
+def nearest_groups(solution: Solution, before: int) -> FrozenMap:
+    """Return the groups of scans nearest to the newest node among those that end before scan `before`."""
     log, scans = solution.log, solution.parameters.group_scans
+    count = before // scans
     known = np.flatnonzero(~log.forgotten[: count * scans : scans])
-    distances = np.hypot(*(solution.node_places(known * scans + scans // 2) - place_now).T)
+    places = solution.node_places(np.append(known * scans + scans // 2, log.scan_count))
+    distances = np.hypot(*(places[:-1] - places[-1]).T)
     distances = distances + _AGE_DISTANCE * known / max(count, 1)
     importance = np.zeros(count)
     importance[known] = fading(distances, solution.parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
-    rows, _ = log.surfaces.rows_of((numbers[:, np.newaxis] * scans + np.arange(scans)).ravel())
+    rows, _ = log.surfaces.rows_of(_scans_of(numbers, scans).ravel())
     points = solution.placed(log.surfaces.points(rows))
     per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
-    return FrozenMap(points, per_point, numbers, importance[numbers], solution.state.run.copy())
+    return FrozenMap(points, per_point, numbers, importance[numbers], scans, solution.state.run.copy())
 
 
 _BESIDE = 5.0
@@ -151,10 +163,9 @@ class Window:
         self._run, self._log, self.state = solution, solution.log, solution.state
         self._odometry, self._parameters = solution.parameters.odometry, solution.parameters
         last = self._log.scan_count
-        self._scans_per_group, first = self._parameters.group_scans, max(0, last - free_nodes)
-        self._recent = first // self._scans_per_group * self._scans_per_group
-        around = solution.node_places(last)
-        self._frozen = nearest_groups(solution, first // self._scans_per_group, around)
+        first = max(0, last - free_nodes)
+        self._frozen = nearest_groups(solution, first)
+        self._recent = first - first % self._frozen.group_scans
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._recent_points = self._log.surfaces.heard(self._recent, last)
@@ -175,9 +186,9 @@ class Window:
         """Return those with the frozen groups and with the scans since; None where posts are ignored."""
         if not self._parameters.post_confidence:
             return None
-        groups = self._frozen.numbers[:, np.newaxis] * self._scans_per_group + np.arange(self._scans_per_group)
+        groups = self._frozen.scans
         recent = np.arange(self._recent, self._layout.last)
-        importance = np.repeat(self._frozen.group_importance, self._scans_per_group)
+        importance = np.repeat(self._frozen.group_importance, self._frozen.group_scans)
         scans, importance = np.append(groups, recent), np.append(importance, np.ones(len(recent)))
         same = self._run.submaps.numbers[scans] == self._run.submaps.newest
         scans, importance = scans[same], importance[same]
@@ -185,16 +196,16 @@ class Window:
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its group's, and one more for nodes beside the window."""
-        number_of_group = np.full(first // self._scans_per_group + 1, -1)
+        number_of_group = np.full(first // self._frozen.group_scans + 1, -1)
         number_of_group[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
         number_of_group[-1] = len(self._frozen.numbers)
-        return number_of_group[np.arange(first) // self._scans_per_group]
+        return number_of_group[np.arange(first) // self._frozen.group_scans]
 
     def _covariance_of_frozen(self, covariances: np.ndarray, first: int) -> np.ndarray:
         """Return (3 g, 3 g) of the groups' poses."""
         if not first:
             return np.zeros((0, 0))
-        middles = self._frozen.numbers * self._scans_per_group + self._scans_per_group // 2
+        middles = self._frozen.scans[:, self._frozen.group_scans // 2]
         return joint_covariance(covariances[np.append(middles, first)])
 
     def fit(self, bend: Optional[Bend] = None) -> None:
@@ -272,7 +283,7 @@ class Window:
         placed = self._frozen.moved_by_run(self.state.run), self._run.placed(self._recent_points)
         weak, (frozen, recent) = across_weak(placed, parameters)
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        self._lists = self._lists or [Neighbours(one, self._scans_per_group) for one in (frozen, recent)]
+        self._lists = self._lists or [Neighbours(one, self._frozen.group_scans) for one in (frozen, recent)]
         met = met_with(self._lists, sources, (frozen, recent), cut, parameters)
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, parameters)
@@ -322,8 +333,7 @@ class Window:
         share, distance, surfaces = agreement(self._met, number - 1, self._parameters)
         return LiveEstimate(
             time=float(self._log.node_times[number]), T_odom_base=T_odom_base, T_map_base=T_map_base,
-            T_map_odom=move_of(T_odom_base, T_map_base), node=node, run=self.state.run.copy(),
-            covariance=covariance, own_covariance=own_covariance,
+            node=node, run=self.state.run.copy(), covariance=covariance, own_covariance=own_covariance,
             world_scale_deviation=self._parameters.world_scale_deviation(self._log),
             reported_velocity=self._log.odometry.velocity_at(self._log.node_times[number]),
             drift=self._odometry.drift(node, T_map_base[2]), comparisons=self._compared(number - 1),

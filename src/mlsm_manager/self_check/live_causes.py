@@ -160,10 +160,11 @@ class LiveCauses:
         """Return what the causes add to the covariance (2, 2) [m^2] of the newest place."""
         with self._lock:
             spread = self._spread
-            causes = [*self.causes(steps), *([self._assumed.if_not] if self._assumed.text else ())]
-            if not self._places or not causes:
+            assumed = [self._assumed.if_not] if self._assumed.text else []
+            if not self._places or not (steps or self._found or assumed):
                 return spread
             places = np.array(self._places)
+        causes = [*self.causes(steps), *assumed]
         return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
 
 

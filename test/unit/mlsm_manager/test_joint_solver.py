@@ -16,7 +16,6 @@ from mlsm_manager.joint_solver.position_models import DvlFactors
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import solved_path
 from node_support.errors import RefusedInput
-from node_support.geometry import composed
 
 DIRECTION_ERROR, LATE = 0.12, 0.6
 DEFAULTS = solver_parameters(sonar_delay_deviation=1.0)
@@ -139,11 +138,6 @@ def test_a_run_that_begins_deaf_starts_at_the_odometry(made):
     estimate = LiveSolver(DEFAULTS, RunLog(SONAR_IN_BASE)).add(made.scans[0].without_points(TURN))
     np.testing.assert_allclose(estimate.T_map_base, estimate.T_odom_base, atol=1e-9)
     assert estimate.comparisons == 0
-
-
-def test_correction_and_pose_agree(live):
-    estimate = live.estimates[-1]
-    np.testing.assert_allclose(composed(estimate.T_map_odom, estimate.T_odom_base), estimate.T_map_base)
 
 
 def test_scans_agree_with_the_map_they_made_and_not_with_another(made, live):

@@ -53,7 +53,7 @@ def test_at_most_so_many_blocks_count(distances, most):
 
 def test_a_scan_is_compared_with_the_nearest_groups_only(log):
     few = replace(solver_parameters(), scans_per_group=1, frozen_scans=2)
-    near = nearest_groups(replace(solution_of(log, DVL, some_state(log)), parameters=few), 3, np.array([12.0, 0.0]))
+    near = nearest_groups(replace(solution_of(log, DVL, some_state(log)), parameters=few), 3)
     assert 1 <= len(near.numbers) <= 2
     assert set(near.points.scans) == set(near.numbers)
     assert len(near.importance) == len(near.points)

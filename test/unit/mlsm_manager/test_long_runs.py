@@ -92,7 +92,7 @@ def test_groups_elsewhere_are_kept():
 
 
 def test_forgotten_groups_are_none_of_the_nearest():
-    np.testing.assert_array_equal(nearest_groups(standing(6, [0, 1], compared=3), 6, np.zeros(2)).numbers, [2, 3, 4])
+    np.testing.assert_array_equal(nearest_groups(standing(6, [0, 1], compared=3), 6).numbers, [2, 3, 4])
 
 
 def round_and_round(times):
