@@ -57,7 +57,8 @@ def _other(row: FaultRow, factor: float) -> float:
     return min(factor * row.size, _SHARE) if row.keyword == "share" else factor * row.size
 
 
-_JUMPED, _STEPPED, _SLIPPED = "odometry jumped", "compass stepped", "head slipped|compass stepped"
+_JUMPED, _SLIPPED = "odometry jumped", "head slipped|compass stepped"
+_STEPPED = "compass stepped|compass, which stepped"
 _FROZEN, _LENGTHS, _DRIFTS = "frozen|held|compass stuck", "distances are", "compass drifts"
 _TURNED, _OVER, _IRON, _STAMPS = "sonar is turned", "upside down", "by the heading", "beams were sent|clock"
 _MOVES = f"{_TURNED}|direction of motion is turned"

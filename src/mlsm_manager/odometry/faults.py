@@ -28,11 +28,13 @@ class FaultKind(Enum):
     CARRIED = "a current carried the vehicle, and the odometry did not feel it"
     STUCK = "the compass stuck"
     RIGHT = "the compass stepped beside positions that are right"
+    FOLLOWED = "positions followed a step of the compass"
 
 
 OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
 # That pairs of scans or headings show.
-_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK, FaultKind.RIGHT)
+TURNED = (FaultKind.RIGHT, FaultKind.FOLLOWED)  # of positions, from a step of the compass on that was left out
+_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK, *TURNED)
 OF_HEAD = (FaultKind.SLIP, FaultKind.SLIPS_ON)
 _GROWING = (FaultKind.DRIFT, FaultKind.SLIPS_ON)
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
@@ -44,7 +46,8 @@ class MotionFault:
 
     sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; the
     logarithm of a factor; or x y [m/s] in odom. end: s, of a current, or of a heading that stuck. After a step of the
-    compass that was left out positions that were right go astray: it is they that are turned.
+    compass that was left out positions that were right go astray, or those that followed where it was left out of the
+    headings alone: it is they that are turned.
     """
 
     kind: FaultKind
@@ -72,6 +75,8 @@ class MotionFault:
             return slips if self.kind is FaultKind.SLIPS_ON else f"the compass drifts {rate}"
         if self.kind is FaultKind.RIGHT:
             return f"the compass stepped by {np.degrees(self.sizes[0]):.0f} deg beside positions that are right,"
+        if self.kind is FaultKind.FOLLOWED:
+            return f"positions followed the compass, which stepped by {-np.degrees(self.sizes[0]):.0f} deg,"
         if self.kind in (FaultKind.STEP, FaultKind.SLIP):
             return f"the head slipped by {abs(np.degrees(self.sizes[0])):.0f} deg, or the compass stepped,"
         if self.kind is FaultKind.CARRIED:
@@ -81,7 +86,7 @@ class MotionFault:
 
     def is_beyond(self, end: float) -> bool:
         """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
-        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK, FaultKind.RIGHT):
+        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK, *TURNED):
             return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind in _GROWING else 1.0)
         return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
@@ -94,7 +99,7 @@ class MotionFault:
         if self.kind is FaultKind.CARRIED:
             since = np.clip(track.times - self.begin, 0.0, self.end - self.begin)
             return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
-        if self.kind is FaultKind.RIGHT:
+        if self.kind in TURNED:
             return with_positions_turned(track, self.sizes[0], self.begin)
         steps = seen_from(track.poses[:-1], track.poses[1:])
         errors = self._errors(track)

@@ -108,7 +108,7 @@ def _with_headings_mended(track: Track, limits: MotionLimits) -> Tuple[Track, Li
             poses = track.poses.copy()
             poses[number:, 2] -= turn
             track = track.with_poses(poses)
-            steps.append(Step(StepKind.COMPASS, time, time, float(np.hypot(*move[:2])), turn))
+            steps.append(Step(StepKind.COMPASS_ALONE, time, time, float(np.hypot(*move[:2])), turn))
     return track, steps
 
 

@@ -8,7 +8,7 @@ from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.odometry.faults import integrated
+from mlsm_manager.odometry.faults import FaultKind, MotionFault, integrated
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import seen_from, wrapped
 from node_support.parameters import ParameterSet, parameter
@@ -41,6 +41,7 @@ class StepKind(Enum):
     JUMPED = "odometry jumped by {size:.1f} m"
     RESTARTED = "odometry started again from zero, {size:.1f} m off"
     COMPASS = "compass stepped by {turn:.0f} deg"
+    COMPASS_ALONE = "compass stepped by {turn:.0f} deg, beside positions that are right,"
     TREMBLES = "the compass trembles by about {turn:.0f} deg"
     REPEATED = "the odometry repeats each pose for about {seconds:.1f} s"
     SCATTERS = "reported positions tremble by about {size:.1f} m"
@@ -72,6 +73,18 @@ class Step:
     def is_too_long(self) -> bool:
         """Whether the vehicle may have done anything meanwhile."""
         return self.lost >= LONGEST_STALL
+
+    @property
+    def misread(self) -> Optional[MotionFault]:
+        """What is wrong without the step if positions went otherwise beside it; None where nothing else is likely.
+
+        The course of a vehicle wanders by as much as small steps of its compass.
+        """
+        if self.kind is StepKind.COMPASS:
+            return MotionFault(FaultKind.RIGHT, self.time, (self.turn,))
+        return (
+            MotionFault(FaultKind.FOLLOWED, self.time, (-self.turn,)) if self.kind is StepKind.COMPASS_ALONE else None
+        )
 
     @property
     def text(self) -> str:

@@ -114,7 +114,7 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
         return _mapped(recording.with_track(track), [*causes, *heard.mounted, cause], known, options)
     of_echoes = [*heard.mounted, *found.causes]
     of_beams = [*beam_causes(recording.sent), *standing_causes(heard.scans, recording.track, replayed.corrected)]
-    refined = _refined(replayed, recording, parameters, found.suspected, [*of_echoes, *of_beams], options)
+    refined = _refined(replayed, recording, parameters, found.suspected, [*causes, *of_echoes, *of_beams], options)
     runs = _runs(replayed, refined)
     if _positions_mislead(recording, heard.scans, extracting, odometry, runs, found.mount, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"

@@ -41,7 +41,7 @@ class Cause:
     text: what and how much, one clause. evidence: nats over "nothing is wrong". begin: s, when it began; NaN where it
     holds for the whole run. is_mended: whether the run went on without it.
     turn: rad, length: relative, metres: by how much the path from `begin` on may be turned, too long, and shifted.
-    fault: which a fit may mend; None where none can.
+    fault: which a fit may mend; None where none can. Of what was mended it is that if it was mended wrongly.
     """
 
     text: str
@@ -129,7 +129,8 @@ def _of_step(steps: List[Step]) -> Cause:
     seconds = float(np.linalg.norm(lost))
     turn = 0.0 if most.kind in (StepKind.POSITIONS, StepKind.HUNG) else _TURN_RATE * seconds
     metres = float(np.hypot(_LEFT * np.sqrt(len(steps)), _SPEED_CHANGE * seconds))
-    return Cause(text, CERTAIN + most.size, steps[0].begin, is_mended, turn, metres=metres)
+    misread = most.misread if len(steps) == 1 else None
+    return Cause(text, CERTAIN + most.size, steps[0].begin, is_mended, turn, metres=metres, fault=misread)
 
 
 def widened(

@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.odometry.mending import stuck_headings
-from mlsm_manager.odometry.steps import Step, StepKind
+from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.beam_causes import head_causes
 from mlsm_manager.self_check.causes import (
@@ -122,7 +122,7 @@ class LiveCauses:
             # What a stuck compass missed is not tried: the path is not mended live.
             shown = [cause.fault for cause in found if cause.fault is not None]
             shown = [fault for fault in shown if fault.kind is not FaultKind.STUCK]
-            suspected = [*suspected, *shown, *_not_followed(steps, run.log.node_times[0])]
+            suspected = [*suspected, *shown, *_misread(steps, run.log.node_times[0])]
             motion = _motion_of(run, suspected, track.with_poses(path), begin, course)
             found, by_mounts, course = motion.told_with(of_echoes, of_beams), motion.by_mounts, motion.course
             spread, assumed = motion.spread(run.log.node_times[-1:])[0], motion.assumed
@@ -168,10 +168,9 @@ class LiveCauses:
         return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
 
 
-def _not_followed(steps: Sequence[Step], begin: float) -> List[MotionFault]:
-    """Return that positions did not follow a step of the compass, of each one after `begin` [s]."""
-    turned = (step for step in steps if step.kind is StepKind.COMPASS and step.begin > begin)
-    return [MotionFault(FaultKind.RIGHT, step.time, (step.turn,)) for step in turned]
+def _misread(steps: Sequence[Step], begin: float) -> List[MotionFault]:
+    """Return what is wrong if positions went otherwise beside steps of the compass after `begin` [s]."""
+    return [step.misread for step in steps if step.misread is not None and step.begin > begin]
 
 
 def _motion_of(

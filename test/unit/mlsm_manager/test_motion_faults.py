@@ -13,7 +13,7 @@ from made_recordings import scans_in, touring
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.odometry.continuous import ContinuousOdometry
 from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
-from mlsm_manager.odometry.steps import MotionLimits
+from mlsm_manager.odometry.steps import MotionLimits, Step, StepKind
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.course import (
@@ -42,6 +42,7 @@ DISTANCES = MotionFault(FaultKind.DISTANCES, START + 100.0, (-0.4,))
 CARRIED = MotionFault(FaultKind.CARRIED, START + 100.0, (0.3, 0.4), START + 120.0)
 STUCK = MotionFault(FaultKind.STUCK, START + 100.0, (0.5,), START + 120.0)
 RIGHT = MotionFault(FaultKind.RIGHT, START + 100.0, (0.5,))
+FOLLOWED = MotionFault(FaultKind.FOLLOWED, START + 100.0, (-0.5,))
 
 
 @pytest.mark.parametrize("fault", [DRIFT, STEP, SLIPS_ON, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
@@ -68,6 +69,7 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
         (replace(STUCK, sizes=(0.0,)), "the compass stuck for 20 s"),
         (RIGHT, "the compass stepped by 29 deg beside positions that are right,"),
+        (FOLLOWED, "positions followed the compass, which stepped by 29 deg,"),
     ],
 )
 def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
@@ -113,6 +115,19 @@ def test_positions_beside_which_the_compass_stepped_go_on_as_they_were():
     odometry.take(stepped)
     mended = RIGHT.mended(odometry.followed(stepped))
     np.testing.assert_allclose(mended.poses, WHOLE.track.at(mended.times), atol=0.1)
+
+
+@pytest.mark.parametrize(("kind", "fault"), [(StepKind.COMPASS, RIGHT), (StepKind.COMPASS_ALONE, FOLLOWED)])
+def test_positions_may_have_gone_otherwise_beside_a_step_of_the_compass(kind, fault):
+    assert Step(kind, START + 100.0, START + 100.0, 0.0, 0.5).misread == fault
+
+
+@pytest.mark.long
+def test_echoes_tell_that_positions_followed_the_compass_where_the_course_seemed_to_say_otherwise():
+    right = source("turning", 300.0)
+    whole, found = (mapped_as(one, "--refine") for one in (right, broken.compass_steps(right, 150.0, 20.0)))
+    assert_named_first(found.findings, "positions followed the compass, which stepped by 20 deg")
+    assert outcome(found, whole, named="").refined < 0.3  # m; 0.9 live
 
 
 def test_a_heading_that_stuck_turns_evenly_meanwhile():
