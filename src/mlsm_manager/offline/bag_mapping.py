@@ -113,15 +113,16 @@ def _mapped(recording: Recording, causes: List[Cause], odometry: OdometryFound, 
         known = odometry._replace(put_right=assumed)
         return _mapped(recording.with_track(track), [*causes, *heard.mounted, cause], known, options)
     of_echoes = [*heard.mounted, *found.causes]
-    of_beams = [*beam_causes(recording.sent), *standing_causes(heard.scans, recording.track, replayed.corrected)]
-    refined = _refined(replayed, recording, parameters, found.suspected, [*causes, *of_echoes, *of_beams], options)
+    standing = standing_causes(heard.scans, recording.track, replayed.corrected)
+    others = [*causes, *beam_causes(recording.sent), *standing]
+    refined = _refined(replayed, recording, parameters, found.suspected, [*of_echoes, *others], options)
     runs = _runs(replayed, refined)
     if _positions_mislead(recording, heard.scans, extracting, odometry, runs, found.mount, options):
         reason = f"{odometry.reason}, but not as the echoes tell: the heading alone is believed"
         cause = Cause("reported positions do not go where the echoes tell", CERTAIN, is_mended=True)
         known = OdometryFound(OdometryKind.HEADING, reason)
         return _mapped(recording, [*causes, *heard.mounted, cause], known, options)
-    causes += [*of_echoes, *of_beams] if refined is None else refined.motion.told_with(of_echoes, of_beams)
+    causes = [*of_echoes, *others] if refined is None else refined.motion.told_with(of_echoes, others)
     return _judged(heard, odometry, parameters, replayed, refined, causes, options)
 
 

@@ -6,7 +6,7 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Un
 import numpy as np
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
-from mlsm_manager.odometry.faults import FaultKind, MotionFault
+from mlsm_manager.odometry.faults import TURNED, FaultKind, MotionFault
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
 
@@ -16,6 +16,7 @@ NAMED_FROM = float(np.log(100.0 / 0.05))
 _FEW = 3  # steps that are told one by one
 _SPEED_CHANGE, _TURN_RATE = 0.15, 0.05  # m/s, rad/s: by which a small vehicle changes its motion while it works
 _LEFT = 0.5  # m: by which the vehicle may move while its odometry jumps, besides what it did just before
+_AGAIN = (FaultKind.STUCK, *TURNED)
 
 Fault = Union[MotionFault, SonarFault]
 
@@ -30,8 +31,8 @@ class Suspicion(NamedTuple):
 
 
 def is_same(one: Optional[Fault], other: Fault) -> bool:
-    """Return whether two faults are one: of most kinds a run has one only, but a compass may stick several times."""
-    return one is not None and one.kind is other.kind and (one.kind is not FaultKind.STUCK or one.begin == other.begin)
+    """Return whether two faults are one: of most kinds a run has one only, but a compass may stick or step again."""
+    return one is not None and one.kind is other.kind and (one.kind not in _AGAIN or one.begin == other.begin)
 
 
 @dataclass(frozen=True)

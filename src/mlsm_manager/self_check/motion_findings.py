@@ -157,16 +157,16 @@ class MotionFindings:
             found.append(Cause(text, 0.5 * direction.size**2, turn=abs(direction.turn)))
         return found
 
-    def told_with(self, of_echoes: Sequence[Cause], of_beams: Sequence[Cause]) -> List[Cause]:
-        """Return the causes with those that pairs of scans and beams show: those that the fit mends it tells better.
+    def told_with(self, of_echoes: Sequence[Cause], others: Sequence[Cause]) -> List[Cause]:
+        """Return the causes with those that pairs of scans show, and others: those that the fit mends it tells better.
 
         A wrong mount or wrong stamps explain what the fit finds wrong with the odometry.
         """
         if any(cause.fault is None for cause in of_echoes):
-            return [*of_echoes, *of_beams]
+            return [*of_echoes, *others]
         faults = [cause.fault for cause in self.causes if cause.fault is not None]
         told = self.causes or of_echoes
-        return [*told, *(cause for cause in of_beams if not any(is_same(cause.fault, one) for one in faults))]
+        return [*told, *(cause for cause in others if not any(is_same(cause.fault, one) for one in faults))]
 
     def placed(self, scan: Scan, reported: Track, sonar_in_base: np.ndarray) -> Scan:
         """Return a scan that was placed by `reported` and `sonar_in_base` (2,) [m] as this run places it."""

@@ -147,6 +147,16 @@ def test_a_compass_that_stuck_is_named_and_the_path_fitted_with_what_it_missed()
 
 
 @pytest.mark.long
+def test_what_a_compass_missed_that_stuck_beside_positions_is_named_once_and_the_path_fitted_with_it():
+    noise = 0.002 * np.random.RandomState(1).normal(size=len(TWICE_ROUND.track.times))
+    right = broken.with_compass_error(TWICE_ROUND, noise)
+    whole, found = (mapped_as(one, "--refine") for one in (right, rare.compass_sticks(right, 200.0)))
+    assert_named_first(found.findings, "the compass stuck for 100 s and missed 170 deg")
+    assert sum("stuck" in cause.text for cause in found.findings.trust.causes) == 1
+    assert outcome(found, whole, named="").refined < 5.0  # m; 7.3 without
+
+
+@pytest.mark.long
 @pytest.mark.parametrize(("begin", "seconds", "is_known"), [(80.0, 200.0, True), (110.0, 150.0, False)])
 def test_a_compass_that_stuck_leaves_the_position_known_where_no_other_turn_is_nearly_as_likely(
     begin, seconds, is_known
