@@ -29,14 +29,17 @@ class FaultKind(Enum):
     STUCK = "the compass stuck"
     RIGHT = "the compass stepped beside positions that are right"
     FOLLOWED = "positions followed a step of the compass"
+    LATER = "the delay of the beams changed"
+    EVER_LATER = "the delay of the beams grows"
 
 
 OF_DISTANCES = (FaultKind.LENGTH, FaultKind.DISTANCES)
 # That pairs of scans or headings show.
 TURNED = (FaultKind.RIGHT, FaultKind.FOLLOWED)  # of positions, from a step of the compass on that was left out
-_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK, *TURNED)
+OF_STAMPS = (FaultKind.LATER, FaultKind.EVER_LATER)
+_SEEN = (FaultKind.SLIP, FaultKind.CARRIED, FaultKind.STUCK, *TURNED, *OF_STAMPS)
 OF_HEAD = (FaultKind.SLIP, FaultKind.SLIPS_ON)
-_GROWING = (FaultKind.DRIFT, FaultKind.SLIPS_ON)
+_GROWING = (FaultKind.DRIFT, FaultKind.SLIPS_ON, FaultKind.EVER_LATER)
 _ALL_ALONG = (FaultKind.LENGTH, FaultKind.CIRCLE)
 
 
@@ -45,9 +48,9 @@ class MotionFault:
     """begin: s, of a drift, a step or a change; NaN where it holds all along.
 
     sizes: (k,) of what mends it: rad/s; rad; rad, times cosine and sine of the heading and of twice the heading; the
-    logarithm of a factor; or x y [m/s] in odom. end: s, of a current, or of a heading that stuck. After a step of the
-    compass that was left out positions that were right go astray, or those that followed where it was left out of the
-    headings alone: it is they that are turned.
+    logarithm of a factor; x y [m/s] in odom; or s, or s in each second, by which beams are later than before. end: s,
+    of a current, or of a heading that stuck. After a step of the compass that was left out positions that were right go
+    astray, or those that followed where it was left out of the headings alone: it is they that are turned.
     """
 
     kind: FaultKind
@@ -69,6 +72,11 @@ class MotionFault:
             factor = float(np.exp(-self.sizes[0]))
             ranges = f", or reported ranges {1.0 / factor:.2f} times" if self.kind is FaultKind.LENGTH else ""
             return f"reported distances are {factor:.2f} times the true ones{ranges}"
+        if self.kind in OF_STAMPS:
+            side = "later" if self.sizes[0] > 0.0 else "earlier"
+            ever = f"ever {side}, by {60.0 * size:.1f} s more in each minute"
+            changed = ever if self.kind in _GROWING else f"{size:.1f} s {side} than before"
+            return f"beams were sent {changed}, by the odometry's clock,"
         if self.kind in _GROWING:
             rate = f"by {-60.0 * np.degrees(self.sizes[0]):+.1f} deg per minute"
             slips = f"the head slipped {rate}, or the compass drifts beside positions that are right,"
@@ -86,7 +94,7 @@ class MotionFault:
 
     def is_beyond(self, end: float) -> bool:
         """Return whether it is larger, by `end` [s], than errors of a compass and a DVL that are as they should be."""
-        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK, *TURNED):
+        if self.kind in (FaultKind.CARRIED, FaultKind.STUCK, *TURNED, *OF_STAMPS):
             return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind in _GROWING else 1.0)
         return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
@@ -101,8 +109,10 @@ class MotionFault:
             return track.with_poses(track.poses + since[:, np.newaxis] * np.append(self.sizes, 0.0))
         if self.kind in TURNED:
             return with_positions_turned(track, self.sizes[0], self.begin)
-        steps = seen_from(track.poses[:-1], track.poses[1:])
         errors = self._errors(track)
+        if self.kind in OF_STAMPS:
+            return track.with_poses(track.at(track.times + errors))
+        steps = seen_from(track.poses[:-1], track.poses[1:])
         if self.kind in OF_DISTANCES:
             steps[:, :2] *= np.exp(errors[1:, np.newaxis])
             return track.with_poses(integrated(track.poses[0], steps))
@@ -177,6 +187,8 @@ _COLUMNS: Dict[FaultKind, Callable[[np.ndarray, np.ndarray, float], np.ndarray]]
     FaultKind.SLIPS_ON: _since,
     FaultKind.LENGTH: lambda times, _, __: np.ones((len(times), 1)),
     FaultKind.DISTANCES: _after,
+    FaultKind.LATER: _after,
+    FaultKind.EVER_LATER: _since,
     FaultKind.CIRCLE: lambda _, yaws, __: harmonics(yaws),
 }
 """Of each kind what one unit of its sizes adds to headings (m,) reported at `times` (m,), (m, k)."""

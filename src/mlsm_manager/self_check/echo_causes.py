@@ -10,13 +10,12 @@ from mlsm_manager.odometry.faults import FaultKind, Mirror, MotionFault, with_he
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
 from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Cause, Fault, ranked
+from mlsm_manager.self_check.delays import LATE, late, suspected_delays
 from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
 _LENGTHS = 2.0 ** np.arange(-2.0, 1.1, 0.25)  # true over reported: where these are feet, mirrored moves fit better, too
-_DELAYED = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
 _TURN_TOLD = np.radians(17.2)  # three deviations of a mounting angle set by eye
-_DELAY_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _ARM_TOLD = 1.25  # m: nobody measures a mount worse; below, the echoes do not tell it
 _SLIP_TOLD = np.radians(12.0)  # three deviations of a compass that turns quickly, or in a gap of the odometry
 _SWAPPED = np.radians(30.0)  # from 90 deg: a vehicle that goes ahead does not tell such a turn from x for y
@@ -78,16 +77,18 @@ def echo_findings(
     is_turned = is_flipped or abs(best.turn) > _TURN_TOLD
     is_named = is_turned and nats > NAMED_FROM and pairs.evidence(best, slipping) > 0.0
     if _is_chance(pairs, best if is_named else pairs.best([right, slipping])):
-        delayed = [] if is_named or _is_chance(pairs, pairs.best(_DELAYED)) else _delayed(pairs, honest)
-        return EchoFindings([_astray(cause, pairs) for cause in delayed or [_SENSELESS]], AS_TOLD)
+        of_delay = [] if is_named or _is_chance(pairs, pairs.best(LATE)) else late(pairs, honest)
+        return EchoFindings([_astray(cause, pairs) for cause in of_delay or [_SENSELESS]], AS_TOLD)
     if is_named:
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
     named = [cause for cause in carried(pairs, honest, _CARRIED)[:1] if cause.evidence > NAMED_FROM]
     # A path that gave way to a current hides it: it is suspected of the odometry itself.
     suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
-    found = [*_delayed(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
-    return EchoFindings(ranked(found), AS_TOLD, [*suspected, *_suspected_slips(pairs, slipping)])
+    found = [*late(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
+    aside = pairs.best(around(AS_TOLD, "turn", _ASIDE))
+    suspected += [*_suspected_slips(pairs, slipping, aside), *suspected_delays(pairs, aside)]
+    return EchoFindings(ranked(found), AS_TOLD, suspected)
 
 
 def _is_chance(pairs: ScanPairs, right: Hypothesis) -> bool:
@@ -175,21 +176,6 @@ def _certainly(track: Track, found: Hypothesis) -> PutRight:
     return PutRight(track, cause, Assumption(_AS_TOLD, 0.0))
 
 
-def _delayed(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
-    found = pairs.best(_DELAYED)
-    nats = pairs.evidence(found, honest) - np.log(len(_DELAYED))
-    if abs(found.delay) <= _DELAY_TOLD or nats < NAMED_FROM:
-        return []
-    return [delay_cause(found.delay, nats)]
-
-
-def delay_cause(delay: float, nats: float) -> Cause:
-    """Return the cause for beams that are `delay` [s] later than their stamps."""
-    side = "later" if delay > 0.0 else "earlier"
-    text = f"beams were sent {abs(delay):.0f} s {side} than their stamps, by the odometry's clock"
-    return Cause(text, nats, metres=1.0)
-
-
 def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     steps = np.arange(-4.0, 4.1)
     ahead = pairs.best(around(AS_TOLD, "ahead", steps))
@@ -241,9 +227,8 @@ def _slipping(pairs: ScanPairs) -> Hypothesis:
     return pairs.best(around(found, "slips", found.slips + _FINE_RATES))
 
 
-def _suspected_slips(pairs: ScanPairs, slipping: Hypothesis) -> List[Fault]:
-    """Return that the head slips all the time, where pairs of scans lie closer to each other if it does."""
-    right = pairs.best(around(AS_TOLD, "turn", _ASIDE))
+def _suspected_slips(pairs: ScanPairs, slipping: Hypothesis, right: Hypothesis) -> List[Fault]:
+    """Return that the head slips all the time, where pairs of scans lie closer to each other if it does than if not."""
     if not slipping.slips or pairs.evidence(slipping, right) < NAMED_FROM:
         return []
     return [MotionFault(FaultKind.SLIPS_ON, float(pairs.times[0, 0]), (slipping.slips,))]

@@ -18,9 +18,10 @@ from mlsm_manager.joint_solver.sonar_trials import (
     likelihood_across,
     ranges_changed_at,
 )
-from mlsm_manager.odometry.faults import OF_DISTANCES, TURNED, FaultKind, likely_faults
+from mlsm_manager.odometry.faults import OF_DISTANCES, OF_STAMPS, TURNED, FaultKind, likely_faults
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same, unsure_length
+from mlsm_manager.self_check.delays import LATE_BY
 from mlsm_manager.self_check.motion_findings import MotionFindings
 
 # A fit that lets the odometry err finds less on unbroken recordings: rad, standard deviation of the logarithm of the
@@ -39,7 +40,7 @@ _NATS_CIRCLE, _LARGE_CIRCLE = 20.0, np.radians(5.0)
 # The same for ranges that change by less than from one setting of a sonar to the next, beside a compass alone. An
 # unbroken marina gains 15 by 1.12, a tour whose ranges change by that 340.
 _NATS_SMALL, _SMALL_CHANGE = 50.0, np.log(1.2)
-_SIZED = (FaultKind.CARRIED, *TURNED)  # whose size pairs of scans or the compass tell: no other is tried
+_SIZED = (FaultKind.CARRIED, *TURNED, *OF_STAMPS)  # whose size pairs of scans or the compass tell: no other is tried
 _LARGER = (1.5, 2.0)  # times what a fit finds that believes the odometry in part
 _ABOUT = (0.8, 0.9, 1.1, 1.2)  # times what pairs of scans show of a head that slips all the time
 _BESIDE = (0.5, 0.75, 0.85, 0.925, 1.075, 1.15, *_LARGER)  # times what is suspected of a sonar
@@ -269,5 +270,6 @@ def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:
     is_size = fault.kind is FaultKind.LENGTH or (found.is_alone and fault.kind is SonarKind.RANGES)
     length = unsure_length(fault.sizes[0]) if is_size else 0.0
     certain = CERTAIN if fault.kind is FaultKind.STUCK else 0.0  # that it did its headings tell
-    cause = Cause(fault.text, certain + trial.gain, fault.begin, length=length, fault=fault)
+    metres = LATE_BY if fault.kind in OF_STAMPS else 0.0
+    cause = Cause(fault.text, certain + trial.gain, fault.begin, length=length, metres=metres, fault=fault)
     return MotionFindings(run, trial.fit, trial.track, [*found.causes, cause])

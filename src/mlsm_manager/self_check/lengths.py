@@ -30,18 +30,20 @@ def assumed_of_lengths(run: Solution) -> Assumption:
 
     Nobody knows the odometry of a run whose model has a rival.
     """
-    length, ranges, model = _odometry_length(run), _range_length(run), run.parameters.odometry
-    if abs(length) >= _ODD_LENGTH and model.rival is not None:
-        text = (
-            f"the sonar's ranges are right, although the odometry's distances are {np.exp(-length):.2f} times as long"
-        )
-        return Assumption(f"{text} (name the odometry to decide)", 0.0, unsure_length(length))
-    if ranges:
-        text = (
-            f"the odometry's distances are right, although the sonar's ranges are {np.exp(-ranges):.2f} times as long"
-        )
-        return Assumption(f"{text} (measure a known distance to decide)", 0.0, unsure_length(ranges))
-    return NOTHING_ASSUMED
+    length = _odometry_length(run)
+    if abs(length) < _ODD_LENGTH or run.parameters.odometry.rival is None:
+        return assumed_of_distances(run)
+    text = f"the sonar's ranges are right, although the odometry's distances are {np.exp(-length):.2f} times as long"
+    return Assumption(f"{text} (name the odometry to decide)", 0.0, unsure_length(length))
+
+
+def assumed_of_distances(run: Solution) -> Assumption:
+    """Return that a run took its odometry's distances for right, where the ranges contradict them clearly."""
+    ranges = _range_length(run)
+    if not ranges:
+        return NOTHING_ASSUMED
+    text = f"the odometry's distances are right, although the sonar's ranges are {np.exp(-ranges):.2f} times as long"
+    return Assumption(f"{text} (measure a known distance to decide)", 0.0, unsure_length(ranges))
 
 
 def _odometry_length(run: Solution) -> float:

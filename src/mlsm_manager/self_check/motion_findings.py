@@ -22,9 +22,10 @@ from mlsm_manager.self_check.course import (
     course_of,
     odometry_agrees,
 )
-from mlsm_manager.self_check.echo_causes import delay_cause, turn_text
+from mlsm_manager.self_check.delays import late_cause
+from mlsm_manager.self_check.echo_causes import turn_text
 from mlsm_manager.self_check.hypotheses import Hypothesis
-from mlsm_manager.self_check.lengths import assumed_of_lengths, length_causes
+from mlsm_manager.self_check.lengths import assumed_of_distances, assumed_of_lengths, length_causes
 from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
@@ -80,7 +81,8 @@ class MotionFindings:
         if not self.is_told:
             return self
         course = self._course_of(path)
-        return self._with(course, course_causes(course, NAMED), self.places[0], True)
+        found = self._with(course, course_causes(course, NAMED), self.places[0], True)
+        return found._assuming(assumed_of_lengths(self.run))
 
     def with_newest_course(self, path: Track, begin: np.ndarray, before: CourseFound) -> "MotionFindings":
         """Return the findings of the newest scans likewise.
@@ -92,7 +94,8 @@ class MotionFindings:
             return self
         course = self._course_of(path).after(before)
         causes = course_causes(course, NAMED_LIVE)
-        return self._with(course, causes, begin, course != NOT_TOLD)
+        # That thrusters err is usual: a run that goes on is not made unsure by it.
+        return self._with(course, causes, begin, course != NOT_TOLD)._assuming(assumed_of_distances(self.run))
 
     def _with(
         self, course: CourseFound, causes: List[Cause], begin: np.ndarray, may_hide: bool
@@ -110,9 +113,11 @@ class MotionFindings:
         causes = [*self.causes, *(causes or self._calibration_causes())]
         apart = [*self.apart, aside, self._late(places)]
         by_mounts = mounts * float(np.hypot(*gone[-1]))
-        assumed = NOTHING_ASSUMED if any(cause.length for cause in causes) else assumed_of_lengths(self.run)
-        found = replace(self, causes=causes, apart=apart, course=course, assumed=assumed)
-        return replace(found, mounts=mounts, by_mounts=by_mounts)
+        return replace(self, causes=causes, apart=apart, course=course, mounts=mounts, by_mounts=by_mounts)
+
+    def _assuming(self, assumed: Assumption) -> "MotionFindings":
+        """Return the findings with what is assumed of lengths, unless a cause says that these are wrong."""
+        return self if any(cause.length for cause in self.causes) else replace(self, assumed=assumed)
 
     def _course_of(self, path: Track) -> CourseFound:
         if self.is_alone:  # nothing else tells a turn of the sonar, however large it is
@@ -151,7 +156,7 @@ class MotionFindings:
         delay, deviation = self._delay
         size = abs(delay) / deviation
         if size > _UNLIKELY_DELAY:
-            found.append(delay_cause(delay, 0.5 * size**2))
+            found.append(late_cause(delay, 0.5 * size**2))
         if direction.size > _UNLIKELY:
             text = turn_text(Hypothesis(turn=direction.turn))
             found.append(Cause(text, 0.5 * direction.size**2, turn=abs(direction.turn)))

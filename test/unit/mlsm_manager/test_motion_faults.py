@@ -43,6 +43,8 @@ CARRIED = MotionFault(FaultKind.CARRIED, START + 100.0, (0.3, 0.4), START + 120.
 STUCK = MotionFault(FaultKind.STUCK, START + 100.0, (0.5,), START + 120.0)
 RIGHT = MotionFault(FaultKind.RIGHT, START + 100.0, (0.5,))
 FOLLOWED = MotionFault(FaultKind.FOLLOWED, START + 100.0, (-0.5,))
+LATER = MotionFault(FaultKind.LATER, START + 100.0, (-4.0,))
+EVER_LATER = MotionFault(FaultKind.EVER_LATER, START, (0.01,))
 
 
 @pytest.mark.parametrize("fault", [DRIFT, STEP, SLIPS_ON, CIRCLE, LENGTH, DISTANCES], ids=lambda fault: fault.kind.name)
@@ -69,6 +71,8 @@ def test_a_fault_is_found_from_what_mends_it(fault):
         (STUCK, "the compass stuck for 20 s and missed 29 deg,"),
         (replace(STUCK, sizes=(0.0,)), "the compass stuck for 20 s"),
         (RIGHT, "the compass stepped by 29 deg beside positions that are right,"),
+        (LATER, "beams were sent 4.0 s earlier than before, by the odometry's clock,"),
+        (EVER_LATER, "beams were sent ever later, by 0.6 s more in each minute, by the odometry's clock,"),
         (FOLLOWED, "positions followed the compass, which stepped by 29 deg,"),
     ],
 )
@@ -115,6 +119,18 @@ def test_positions_beside_which_the_compass_stepped_go_on_as_they_were():
     odometry.take(stepped)
     mended = RIGHT.mended(odometry.followed(stepped))
     np.testing.assert_allclose(mended.poses, WHOLE.track.at(mended.times), atol=0.1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("growing", "said"), [(False, "beams were sent 4.0 s earlier than before"), (True, "beams were sent ever earlier")]
+)
+def test_a_delay_that_changes_is_named_and_the_path_fitted_with_the_stamps_put_right(growing, said):
+    right = source("harbour", 400.0)
+    late = broken.delayed(right, 6.0, growing=True) if growing else broken.delayed(right, 4.0, at=200.0)
+    whole, found = (mapped_as(one, "--refine") for one in (right, late))
+    assert_named_first(found.findings, said)
+    assert outcome(found, whole, named="").refined < 0.5  # m
 
 
 @pytest.mark.parametrize(("kind", "fault"), [(StepKind.COMPASS, RIGHT), (StepKind.COMPASS_ALONE, FOLLOWED)])

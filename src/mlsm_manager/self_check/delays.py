@@ -1,0 +1,80 @@
+"""When the beams were sent, by the odometry's clock: all later than their stamps, or from a moment on, or ever more."""
+
+from typing import List, NamedTuple
+
+import numpy as np
+
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
+from mlsm_manager.self_check.causes import NAMED_FROM, Cause
+from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
+
+LATE = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
+"""Delays that may hold all along."""
+LATE_BY = 1.0
+"""m, by which beams of wrong stamps make the path unsure: what a small vehicle goes in some seconds."""
+_LATE_TOLD = 3.0  # s: three deviations of what is known of a head's delay
+_DELAYS = np.arange(-8.0, 8.5, 0.5)  # s, before and after a change, or at the beginning and at the end
+_FEWEST = 6  # pairs of scans that tell a delay
+
+
+def late(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
+    """Return that all beams are later than their stamps, or earlier, where that is likelier than `honest`."""
+    found = pairs.best(LATE)
+    nats = pairs.evidence(found, honest) - np.log(len(LATE))
+    if abs(found.delay) <= _LATE_TOLD or nats < NAMED_FROM:
+        return []
+    return [late_cause(found.delay, nats)]
+
+
+def late_cause(delay: float, nats: float) -> Cause:
+    """Return the cause for beams that are `delay` [s] later than their stamps."""
+    side = "later" if delay > 0.0 else "earlier"
+    text = f"beams were sent {abs(delay):.0f} s {side} than their stamps, by the odometry's clock"
+    return Cause(text, nats, metres=LATE_BY)
+
+
+class _Delays(NamedTuple):
+    """rows: (p,) int, of the delay at each pair, in _DELAYS. fault: with which the delay is so."""
+
+    rows: np.ndarray
+    fault: MotionFault
+
+
+def suspected_delays(pairs: ScanPairs, base: Hypothesis) -> List[MotionFault]:
+    """Return the likeliest change of the beams' delay, and the likeliest growth, each if it is likelier than none.
+
+    base: what is right besides.
+    """
+    table, times = np.array([pairs.distances(one) for one in around(base, "delay", _DELAYS)]), pairs.times.mean(axis=1)
+    even, numbers = table[table.mean(axis=1).argmin()], np.arange(len(times))
+    found = []
+    for kind in filter(None, (_changes(table, times), _growths(times))):
+        apart, best = min(((table[one.rows, numbers], one) for one in kind), key=lambda tried: tried[0].mean())
+        if evidence_of(even, apart, pairs.scans) > NAMED_FROM:
+            found.append(best.fault)
+    return found
+
+
+def _changes(table: np.ndarray, times: np.ndarray) -> List[_Delays]:
+    """Return the likeliest delays before and after each moment with enough pairs on both sides.
+
+    table: (k, p) m, how far pairs at `times` (p,) [s] lie apart with each delay.
+    """
+    found = []
+    for begin in np.unique(times)[_FEWEST:-_FEWEST]:
+        before = times < begin
+        first, last = (int(table[:, which].mean(axis=1).argmin()) for which in (before, ~before))
+        fault = MotionFault(FaultKind.LATER, float(begin), (float(_DELAYS[last] - _DELAYS[first]),))
+        found.append(_Delays(np.where(before, first, last), fault))
+    return found
+
+
+def _growths(times: np.ndarray) -> List[_Delays]:
+    """Return delays that grow evenly, from any one to any other."""
+    found, since = [], (times - times[0]) / max(np.ptp(times), 1.0)
+    for first in range(len(_DELAYS)):
+        for last in range(len(_DELAYS)):
+            rows = np.round(first + since * (last - first)).astype(int)
+            rate = float(_DELAYS[last] - _DELAYS[first]) / max(float(np.ptp(times)), 1.0)
+            found.append(_Delays(rows, MotionFault(FaultKind.EVER_LATER, float(times[0]), (rate,))))
+    return found
