@@ -53,8 +53,8 @@ class Listener:
 
     @property
     def hours(self) -> float:
-        """Simulated hours since the first message of the clock."""
-        return (self.now - self.start) / 3600.0
+        """Simulated hours since the first message of the clock; 0 before it."""
+        return (self.now - self.start) / 3600.0 if self.start == self.start else 0.0
 
     def value(self, stage: str, counter: str, untold: int = -1) -> int:
         """Return a counter as a stage told it last; `untold` where it told none."""
