@@ -82,9 +82,9 @@ class Step:
         """
         if self.kind is StepKind.COMPASS:
             return MotionFault(FaultKind.RIGHT, self.time, (self.turn,))
-        return (
-            MotionFault(FaultKind.FOLLOWED, self.time, (-self.turn,)) if self.kind is StepKind.COMPASS_ALONE else None
-        )
+        if self.kind is StepKind.COMPASS_ALONE:
+            return MotionFault(FaultKind.FOLLOWED, self.time, (-self.turn,))
+        return None
 
     @property
     def text(self) -> str:

@@ -220,7 +220,7 @@ def _suspected_changes(pairs: ScanPairs) -> List[Fault]:
 def _slipping(pairs: ScanPairs) -> Hypothesis:
     """Return the likeliest of a head that slips all the time, beside a DVL that is turned a little.
 
-    The odometry's path is asked: a run that took the head's angles for right may be bent by them.
+    Scans are compared along the odometry's path: that of a run that took the angles for right may be bent by them.
     """
     found = pairs.best(around(AS_TOLD, "slips", _RATES))
     found = pairs.best(around(found, "turn", _ASIDE))
