@@ -74,7 +74,7 @@ class OdometryFound(NamedTuple):
     def assumed(self) -> Assumption:
         """What the path rests on though nothing was measured of it; empty where something was."""
         if self.motion is SweepMotion.UNTOLD:
-            return Assumption("the vehicle is held still, and nothing tells whether it was")
+            return Assumption("the vehicle stood still, which nothing tells")
         return self.put_right
 
 

@@ -65,8 +65,8 @@ class Trust:
         if self.answer is RunAnswer.DOUBTFUL:
             wrong = [cause.line(begin) for cause in self.causes if not cause.is_mended]
             said = "; ".join([*wrong, *(one.text for one in doubtful)])
-            known = f"at best {self._known}" if self._is_told else _NOTHING
-            return f"trust: DOUBTFUL: {said}{mended}; {known}"
+            known = self._known_if(self.assumed.text) if self.assumed.text else self._known
+            return f"trust: DOUBTFUL: {said}{mended}; {f'at best {known}' if self._is_told else _NOTHING}"
         if self.answer is RunAnswer.UNMEASURED:
             return f"trust: NOT MEASURED: {self._not_measured}{mended}"
         if self.answer is RunAnswer.PARTLY:
@@ -77,8 +77,15 @@ class Trust:
 
     @property
     def _known(self) -> str:
-        """How well the position is known, if what is assumed is so."""
-        return f"position {_within(float(self.deviations.max()) if np.isnan(self.if_so) else self.if_so)}"
+        """How well the position is known."""
+        return f"position {_within(float(self.deviations.max()))}"
+
+    def _known_if(self, assumed: str) -> str:
+        """Return how well the position is known if what is assumed is so, and if not; assumed: that in words."""
+        if_not = float(self.deviations.max())
+        if_so = if_not if np.isnan(self.if_so) else self.if_so
+        otherwise = f", {_within(if_not)} if not" if if_not > if_so else ""
+        return f"position {_within(if_so)} if {assumed}{otherwise}"
 
     @property
     def _not_measured(self) -> str:
@@ -90,9 +97,7 @@ class Trust:
             return f"{reason}; {_NOTHING}"
         if not self.assumed.text:
             return f"{reason}; {self._known} if there are none"
-        deviation = float(self.deviations.max())
-        otherwise = f", {_within(deviation)} if not" if deviation > self.if_so else ""
-        return f"{reason}; {self._known} if so{otherwise}"
+        return f"{reason}; {self._known_if('so')}"
 
     @property
     def _is_told(self) -> bool:

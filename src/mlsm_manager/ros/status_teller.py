@@ -84,8 +84,9 @@ class StatusTeller:
         place, T_map_base = self._place_now()
         if place is not None:
             report_place(self._health, place)
-        causes = self._localiser.following.causes()
-        report_causes(self._health, causes)
+        following = self._localiser.following
+        causes = following.causes()
+        report_causes(self._health, causes, following.found.assumed)
         stages = (*self.stages_before, self._health)
         silent = {topic: seconds for stage in stages for topic, seconds in stage.silent().items()}
         doubts = doubts_of(place, causes, self.verdicts, silent, self._odometry.name)

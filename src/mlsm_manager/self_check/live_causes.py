@@ -152,6 +152,11 @@ class LiveCauses:
         if not self._found or np.trace(spread) > np.trace(self._spread):
             self._spread, self.by_mounts = spread, by_mounts
 
+    @property
+    def assumed(self) -> str:
+        """What the path rests on though nobody measured it; empty where it rests on nothing such."""
+        return self._assumed.text
+
     def causes(self, steps: Sequence[Step]) -> List[Cause]:
         """Return what is wrong, ranked; steps: of the odometry, which were left out."""
         return ranked([*of_steps(steps), *self._found])

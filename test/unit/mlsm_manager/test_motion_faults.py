@@ -270,17 +270,19 @@ def test_a_dvl_is_believed_where_the_ranges_contradict_it_and_that_is_stated(fac
 
 
 @pytest.mark.long
-def test_where_ranges_contradict_a_dvl_the_position_is_less_known_while_the_run_goes_on_too():
+def test_where_ranges_contradict_a_dvl_the_position_is_less_known_and_that_is_told_while_the_run_goes_on_too():
     parameters = ReplayParameters().changed(profile_values(OdometryKind.DVL))
     right = source("harbour", 300.0)
-    added = []
+    added, assumed = [], []
     for recording in (right, broken.range_changed(right, 0.0, 1.15)):
         localiser = parameters.build_localiser(recording.sonar_in_base)
         for scan in scans_in(recording, parameters.echoes()):
             localiser.take_scan(scan)
         localiser.look_for_causes()
         added.append(np.trace(localiser.following.found.covariance([])))
+        assumed.append(localiser.following.found.assumed[:35])
     assert added[0] < 0.1 < added[1]  # m^2
+    assert assumed == ["", "the odometry's distances are right,"]
 
 
 @pytest.mark.long

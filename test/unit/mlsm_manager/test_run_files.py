@@ -174,6 +174,11 @@ def test_of_an_odometry_that_was_put_right_is_said_how_well_the_position_is_know
     assert trust.uncertainty is not None
 
 
+def test_where_something_else_is_wrong_the_line_tells_what_the_position_rests_on():
+    trust = replace(trust_of(FIRING), assumed=Assumption("the sonar's ranges are right"), if_so=1.0)
+    assert trust.line.endswith("; at best position within 1.7 m if the sonar's ranges are right, within 8.7 m if not")
+
+
 @pytest.mark.parametrize(("gone", "assumed"), [(20.0, NOTHING_ASSUMED), (80.0, LENGTHS)])
 def test_lengths_that_nobody_measured_are_told_where_the_position_depends_on_them(gone, assumed):
     trust = trust_of(FINE).assuming(LENGTHS, np.array([[0.0, 0.0], [gone / 2.0, 0.0], [gone, 0.0]]))
