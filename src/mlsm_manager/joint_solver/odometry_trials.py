@@ -1,7 +1,7 @@
 """Fits of a run that believe its odometry less, or another one."""
 
 from dataclasses import dataclass, replace
-from typing import Optional, Tuple
+from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -45,39 +45,38 @@ def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     return OdometryErrors(run.log.node_times.copy(), reported[:, YAW], nodes[:, YAW], scales, places)
 
 
-def fit_with(run: Solution, track: Track, stretch: Optional[Tuple[float, float]] = None) -> BatchResult:
-    """Return the fit of a run, from where it is, if its odometry had reported `track`.
+def with_odometry(run: Solution, track: Track) -> Solution:
+    """Return a run as if its odometry had reported `track`; its path is not fitted to that."""
+    return replace(run, log=run.log.since(0, OdometryLog.of(track)))
 
-    stretch: s, begin and end of one whose path the fit begins with as `track` says; None where there is none.
-    """
-    log = run.log.since(0, OdometryLog.of(track))
-    nodes = run.state.nodes.copy()
-    numbers = np.arange(len(nodes))
+
+def fit_from(run: Solution, starts: Sequence[State]) -> BatchResult:
+    """Return the likeliest of the fits of a run that begin at each of `starts`."""
+    return max((fit_of(run.with_state(start)) for start in starts), key=lambda fit: fit.log_likelihood)
+
+
+def path_kept(run: Solution, log: RunLog) -> State:
+    """Return the path of a run as it is, by another log."""
+    numbers, nodes = np.arange(len(run.state.nodes)), run.state.nodes.copy()
     nodes[:, : YAW + 1] += run.log.node_poses(numbers) - log.node_poses(numbers)
-    if stretch is not None:
-        nodes = reckoned(run, log, nodes, stretch)
-    return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
+    return State(nodes, run.state.run.copy())
 
 
-def fit_reported(run: Solution, track: Track) -> BatchResult:
-    """Return the fit of a run if its odometry had reported `track`, from there on: where the run is may be far off."""
-    log, model = run.log.since(0, OdometryLog.of(track)), run.parameters.odometry
-    nodes = np.tile(model.first_node(), (len(run.state.nodes), 1))
-    return fit_of(replace(run, log=log, state=State(nodes, run.parameters.run_mean(log))))
+def path_reported(run: Solution) -> State:
+    """Return the path that the odometry of a run reports: where the run is may be far off."""
+    nodes = np.tile(run.parameters.odometry.first_node(), (len(run.state.nodes), 1))
+    return State(nodes, run.parameters.run_mean(run.log))
 
 
-def fit_turned(run: Solution, track: Track) -> BatchResult:
-    """Return the fit of a run if its odometry had reported `track`, whose headings are others.
-
-    It begins with the way that the run went, each step in the vehicle's own frame.
-    """
-    log, nodes = run.log.since(0, OdometryLog.of(track)), run.state.nodes.copy()
+def steps_kept(run: Solution, log: RunLog) -> State:
+    """Return the path of a run by a log with other headings: each step as it is in the vehicle's own frame."""
+    nodes = run.state.nodes.copy()
     numbers = np.arange(len(nodes))
     before, after = run.log.node_poses(numbers), log.node_poses(numbers)
     places, turns = before[:, :YAW] + nodes[:, :YAW], after[:, YAW] - before[:, YAW]
     steps = rotated(np.diff(places, axis=0), (turns[1:] + turns[:-1]) / 2.0)
     nodes[1:, :YAW] = places[0] + np.cumsum(steps, axis=0) - after[1:, :YAW]
-    return fit_of(replace(run, log=log, state=State(nodes, run.state.run.copy())))
+    return State(nodes, run.state.run.copy())
 
 
 def reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float, float]) -> np.ndarray:

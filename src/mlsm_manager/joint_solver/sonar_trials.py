@@ -6,9 +6,9 @@ from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of, likelihood_of
+from mlsm_manager.joint_solver.batch_solver import BatchResult, likelihood_of
 from mlsm_manager.joint_solver.normal_equations import YAW, State
-from mlsm_manager.joint_solver.odometry_trials import reckoned
+from mlsm_manager.joint_solver.odometry_trials import fit_from, reckoned
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.surface_points import SurfacePoints
@@ -127,12 +127,9 @@ def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, BatchResult
     as much longer: the path that they made may be far from the true one. It may also be near, where some scans met the
     map: so it begins from that, too.
     """
-    log = fault.logged(run.log)
-    fits = []
-    for nodes in _starts(run, log, fault):
-        changed = replace(run, log=log, state=State(nodes, run.state.run.copy()))
-        fits.append((changed, fit_of(changed)))
-    return max(fits, key=lambda one: one[1].log_likelihood)
+    changed = replace(run, log=fault.logged(run.log))
+    starts = [State(nodes, run.state.run.copy()) for nodes in _starts(run, changed.log, fault)]
+    return changed, fit_from(changed, starts)
 
 
 def _starts(run: Solution, log: RunLog, fault: SonarFault) -> List[np.ndarray]:

@@ -6,8 +6,17 @@ from typing import List, NamedTuple, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
-from mlsm_manager.joint_solver.odometry_log import OdometryLog
-from mlsm_manager.joint_solver.odometry_trials import OdometryErrors, fit_reported, fit_turned, fit_with, freed_errors
+from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.odometry_trials import (
+    OdometryErrors,
+    fit_from,
+    freed_errors,
+    path_kept,
+    path_reported,
+    reckoned,
+    steps_kept,
+    with_odometry,
+)
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import (
     SonarFault,
@@ -18,7 +27,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
     likelihood_across,
     ranges_changed_at,
 )
-from mlsm_manager.odometry.faults import OF_DISTANCES, OF_STAMPS, TURNED, FaultKind, likely_faults
+from mlsm_manager.odometry.faults import OF_DISTANCES, OF_STAMPS, TURNED, FaultKind, MotionFault, likely_faults
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same, unsure_length
 from mlsm_manager.self_check.delays import LATE_BY
@@ -224,16 +233,12 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     if isinstance(fault, SonarFault):
         run, fit = fit_without(found.run, fault)
         return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
-    track, run = fault.mended(found.track), found.run
+    track = fault.mended(found.track)
+    run = with_odometry(found.run, track)
     if fault.kind is FaultKind.STUCK:  # how the vehicle turned meanwhile the echoes tell
         model = run.parameters.odometry.stuck(fault.begin, fault.end)
         run = replace(run, parameters=replace(run.parameters, odometry=model))
-    span = (fault.begin, fault.end) if fault.kind is FaultKind.CARRIED else None
-    turns = found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP)
-    fit = fit_turned(run, track) if turns else fit_with(run, track, span)
-    if fault.kind is FaultKind.SLIPS_ON:
-        fit = max(fit, fit_reported(run, track), key=lambda one: one.log_likelihood)
-    run = replace(run, log=run.log.since(0, OdometryLog.of(track)))
+    fit = fit_from(run, _starts(found, run, fault))
     gain = fit.log_likelihood - found.fit.log_likelihood
     if fault.kind is FaultKind.STUCK:
         gain += (_SHOWN if found.is_alone else 0.0) - (_NATS_TURNED if fault.sizes[0] else 0.0)
@@ -242,6 +247,16 @@ def _tried(found: MotionFindings, fault: Fault) -> _Trial:
         # Pairs of scans that meet only with the current count if the pairs that met before speak for it, too.
         gain -= more if fault.kind in OF_DISTANCES or gain < more else 0.0
     return _Trial(fault, run, fit, track, gain)
+
+
+def _starts(found: MotionFindings, run: Solution, fault: MotionFault) -> List[State]:
+    """Return where a fit of `run`, which lacks a fault of the odometry, may begin."""
+    if found.is_alone and fault.kind in (FaultKind.STUCK, FaultKind.SLIP):
+        return [steps_kept(found.run, run.log)]
+    kept = path_kept(found.run, run.log)
+    if fault.kind is FaultKind.CARRIED:
+        return [State(reckoned(found.run, run.log, kept.nodes, (fault.begin, fault.end)), kept.run)]
+    return [kept, path_reported(run)] if fault.kind is FaultKind.SLIPS_ON else [kept]
 
 
 def _of_more(found: MotionFindings, run: Solution, fit: BatchResult, begin: float) -> float:
