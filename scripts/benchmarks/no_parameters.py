@@ -126,7 +126,7 @@ def _twin(name: str, _seed: int) -> Recording:
 def outcome(recording: Recording, named: Sequence[str]) -> Outcome:
     """Map a recording whose truth is known."""
     mapped = mapped_as(recording, "--refine", *named)
-    found = mapped.replayed.hypotheses.told or mapped.odometry.kind.value
+    found = mapped.replayed.rivals.told or mapped.odometry.kind.value
     milliseconds = 1e3 * float(np.median(mapped.replayed.seconds))
     return Outcome(_live(mapped, recording), _refined(mapped, recording), found, milliseconds)
 

@@ -14,7 +14,7 @@ from benchmarks.rare_faults import bottom_lost
 from mlsm_manager.offline.recording import read_recording, scans_of
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.self_check.echo_causes import echo_findings
-from mlsm_manager.self_check.hypotheses import AS_TOLD
+from mlsm_manager.self_check.scan_pairs import AS_TOLD
 from recordings.reader import Request
 from sonar_processing.filters.echo_extractor import EchoExtractor
 

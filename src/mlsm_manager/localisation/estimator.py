@@ -6,8 +6,8 @@ from typing import Deque, Dict, List, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.clouds import CorrectionHistory
 from mlsm_manager.localisation.keyframe_map import KeyframeMaps, MapSettings
@@ -89,14 +89,14 @@ class Estimator(ABC):
         return 0.0
 
     @property
-    def hypotheses(self) -> Optional[Hypotheses]:
+    def rivals(self) -> Optional[RivalSolvers]:
         """The joint solvers of the current run; None where none runs."""
         return None
 
     @property
     def solver(self) -> Optional[LiveSolver]:
         """The joint solver that is believed; None where none runs."""
-        return None if self.hypotheses is None else self.hypotheses.shown
+        return None if self.rivals is None else self.rivals.shown
 
     @property
     def odometry(self) -> str:

@@ -5,9 +5,9 @@ from typing import List, Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
-from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
 from mlsm_manager.joint_solver.solution import Fix, Solution
 from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
@@ -93,8 +93,8 @@ class Joint(Estimator):
         return [] if self._session is None else self._session.verdicts()
 
     @property
-    def hypotheses(self) -> Optional[Hypotheses]:
-        return self._session.hypotheses if self._session is not None else None
+    def rivals(self) -> Optional[RivalSolvers]:
+        return self._session.rivals if self._session is not None else None
 
     def newest_run(self, turns: int) -> Optional[Solution]:
         return None if self._session is None else self._session.newest_run(turns)
@@ -105,7 +105,7 @@ class Joint(Estimator):
             return ""
         if self._without_positions is not None and self.parameters is self._without_positions.parameters:
             return "HEADING, because positions never change"
-        return self._session.hypotheses.told
+        return self._session.rivals.told
 
     @property
     def target(self) -> BlockSource:
@@ -263,7 +263,7 @@ class Joint(Estimator):
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self._session = session
-        if session.solver.closed is not None or session.hypotheses.switched:
+        if session.solver.closed is not None or session.rivals.switched:
             self._maps.redraw(session)
         self._maps.matched.add(MapCloud.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)

@@ -7,13 +7,13 @@ import numpy as np
 from scipy.linalg import block_diag
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, Turns
-from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
 from mlsm_manager.joint_solver.solution import Fix, Solution
 from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.updates import ScanUpdate
@@ -47,7 +47,7 @@ class JointSession:
     scans: all that it took, as they came, and scans without echoes for pauses; none after a long run.
     """
 
-    hypotheses: Hypotheses
+    rivals: RivalSolvers
     T_map_odom: np.ndarray
     scans: List[Scan] = field(default_factory=list)
     _taken: int = 0
@@ -56,7 +56,7 @@ class JointSession:
     @property
     def solver(self) -> LiveSolver:
         """The solver that is believed."""
-        return self.hypotheses.shown
+        return self.rivals.shown
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan, and scans without echoes for a pause before it; see LiveSolver.add."""
@@ -65,7 +65,7 @@ class JointSession:
         return self._add(scan, fix)
 
     def _add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
-        estimate = self.hypotheses.add(moved(scan, self.T_map_odom), fix)
+        estimate = self.rivals.add(moved(scan, self.T_map_odom), fix)
         self._taken += 1
         self.scans.append(scan)
         if self._taken > _MOST_STORED:
@@ -83,7 +83,7 @@ class JointSession:
     ) -> "JointSession":
         """Return a run that goes on after `scans`; see LiveSolver.resumed."""
         placed = [moved(scan, T_map_odom) for scan in scans]
-        return cls(Hypotheses.resumed(parameters, sonar_in_base, placed, stored), T_map_odom, list(scans), len(scans))
+        return cls(RivalSolvers.resumed(parameters, sonar_in_base, placed, stored), T_map_odom, list(scans), len(scans))
 
     @classmethod
     def begun(
@@ -96,10 +96,10 @@ class JointSession:
     ) -> "JointSession":
         """Return a new run in a map of blocks with means at `known` (n, 2) m; `start`: see LiveSolver."""
         surfaces = KnownSurfaces(known) if len(known) else None
-        return cls(Hypotheses.begun(parameters, sonar_in_base, start, surfaces), T_map_odom)
+        return cls(RivalSolvers.begun(parameters, sonar_in_base, start, surfaces), T_map_odom)
 
     def solved_with(self, parameters: SolverParameters) -> "JointSession":
-        other = JointSession(self.hypotheses.begun_with(parameters), self.T_map_odom)
+        other = JointSession(self.rivals.begun_with(parameters), self.T_map_odom)
         for scan in self.scans:
             other._add(scan)
         return other
@@ -133,7 +133,7 @@ class JointSession:
             *(self._uncertainty(estimates[-1]) for _ in turns.times[1:2]),
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.distance_deviation),
             *in_submaps(turns.times, turns.apart),
-            *odometry_decided(self.hypotheses.doubt),
+            *odometry_decided(self.rivals.doubt),
         ]
 
     def _uncertainty(self, newest: LiveEstimate) -> Verdict:
@@ -167,9 +167,9 @@ class JointSession:
 
     def copied(self) -> "JointSession":
         """Return a copy; what it learns the original does not."""
-        hypotheses = self.hypotheses
+        rivals = self.rivals
         sonar = self.solver.log.sonar_in_base
-        return self.resumed(hypotheses.parameters, sonar, self.T_map_odom, self.scans, hypotheses.stored())
+        return self.resumed(rivals.parameters, sonar, self.T_map_odom, self.scans, rivals.stored())
 
     def newest_run(self, turns: int) -> Solution:
         """Return the newest turns of the head as a run of their own, which shares nothing with this one."""
@@ -180,7 +180,7 @@ class JointSession:
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""
-        self.hypotheses.follow(_moved_track(track, self.T_map_odom), time)
+        self.rivals.follow(_moved_track(track, self.T_map_odom), time)
 
     def heard(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:
         """Return the points (n, 4) of a cloud in map, and where the sonar was when it heard each, (n, 2) m."""

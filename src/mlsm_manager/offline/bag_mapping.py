@@ -124,7 +124,7 @@ def _refined(
     if not options.refine:
         return None
     suspected = [*suspected, *(cause.fault for cause in causes if cause.fault is not None)]
-    with progress_bar(parts_of_refining(replayed.hypotheses), "part", "refine") as bar:
+    with progress_bar(parts_of_refining(replayed.rivals), "part", "refine") as bar:
         suspicion = Suspicion(suspected, ranges_are_told(recording.sent))
         return refine(replayed, recording.track, parameters.map_settings(), suspicion, bar.update)
 
@@ -138,8 +138,8 @@ def _judged(
     if options.check:
         with progress_bar(REFITS, "fit", "check") as bar:
             further += refitted_verdicts(refined.solution, refined.batch, bar.update)
-    if replayed.hypotheses is not None and replayed.hypotheses.told:
-        odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.hypotheses.told}")
+    if replayed.rivals is not None and replayed.rivals.told:
+        odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.rivals.told}")
     findings, known = None, parameters
     if replayed.solver is not None:
         findings = Findings.of(replayed, refined, further, causes, _assumed(odometry, heard.mounted, refined, replayed))

@@ -206,7 +206,7 @@ def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> Li
         as_expected(before.names, before.values, before.deviations, calibration.values),
         *_halves(solver),
         *mount_told(best.mounts),
-        *odometry_decided(replayed.hypotheses.doubt),
+        *odometry_decided(replayed.rivals.doubt),
     ]
 
 

@@ -14,8 +14,8 @@ from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.causes import CERTAIN, Cause
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, turn_text
-from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
+from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored

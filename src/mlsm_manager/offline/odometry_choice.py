@@ -25,7 +25,7 @@ from mlsm_manager.self_check.beam_causes import ranges_are_told
 from mlsm_manager.self_check.course import moves_are_turned
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import with_other_ranges
-from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis
+from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis
 from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.filters.echo_extractor import EchoExtractor
 

@@ -6,10 +6,10 @@ from typing import Callable, List, Mapping
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, LoopClosure, fit_of, with_loops_closed
-from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
 from mlsm_manager.joint_solver.solution import Solution, solved_path
 from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
@@ -53,9 +53,9 @@ REFITS = 5
 """Parts of `refitted_verdicts`."""
 
 
-def parts_of_refining(hypotheses: Hypotheses) -> int:
+def parts_of_refining(rivals: RivalSolvers) -> int:
     """Return how often `refine` says that a part is done: the fit of each odometry, loops, faults, the map."""
-    return len(hypotheses.solvers) + 3
+    return len(rivals.solvers) + 3
 
 
 def refine(
@@ -67,12 +67,12 @@ def refine(
     Of several odometries the likelier one is believed from then on. suspicion: of sonar or odometry, which said
     `track`.
     """
-    hypotheses = replayed.hypotheses
+    rivals = replayed.rivals
     fits = []
-    for solver in hypotheses.solvers:
+    for solver in rivals.solvers:
         fits.append(fitted(solver))
         done()
-    best, solver = hypotheses.believed(fits), hypotheses.shown
+    best, solver = rivals.believed(fits), rivals.shown
     closing = with_loops_closed(solver, best)
     done()
     run = solver.solution.with_state(closing.batch.state)

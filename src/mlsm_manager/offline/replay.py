@@ -8,9 +8,9 @@ from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 import numpy as np
 import yaml
 
-from mlsm_manager.joint_solver.hypotheses import Hypotheses
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.parameters import SolverParameters
+from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.parameters import LocaliserParameters, MapInput, MatchInput, MlsmCoreParameters
@@ -162,9 +162,9 @@ class Replayed:
         return [update.scan for update in self.updates]
 
     @property
-    def hypotheses(self) -> Optional[Hypotheses]:
+    def rivals(self) -> Optional[RivalSolvers]:
         """The joint solvers that have taken all scans; None where each was matched alone."""
-        return self.estimator.hypotheses
+        return self.estimator.rivals
 
     @property
     def solver(self) -> Optional[LiveSolver]:

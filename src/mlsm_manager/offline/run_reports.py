@@ -25,8 +25,8 @@ _MOST_LOOPS = 5  # loops that are printed; summary.json has all
 
 def summary_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]], seconds: float) -> Dict[str, Any]:
     """Return what summary.json holds. errors: of each trajectory. seconds: how long the run took."""
-    parameters, hypotheses = mapped.parameters, mapped.replayed.hypotheses
-    lead = {} if hypotheses is None or np.isnan(hypotheses.lead) else {"lead": round(hypotheses.lead, 1)}
+    parameters, rivals = mapped.parameters, mapped.replayed.rivals
+    lead = {} if rivals is None or np.isnan(rivals.lead) else {"lead": round(rivals.lead, 1)}
     return {
         **mapped.run.counts,
         "odometry": {"profile": mapped.odometry.name, "reason": mapped.odometry.reason, **lead},

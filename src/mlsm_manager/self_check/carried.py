@@ -9,7 +9,7 @@ import numpy as np
 
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.self_check.causes import Cause
-from mlsm_manager.self_check.hypotheses import Hypothesis, NearPairs, ScanPairs, evidence_of
+from mlsm_manager.self_check.scan_pairs import Hypothesis, NearPairs, ScanPairs, evidence_of
 from node_support.geometry import grid
 
 _SPEEDS = np.arange(-0.6, 0.61, 0.15)  # m/s, along x and y: currents that a small vehicle is used in

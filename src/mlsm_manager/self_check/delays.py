@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.self_check.causes import NAMED_FROM, Cause
-from mlsm_manager.self_check.hypotheses import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
+from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
 
 LATE = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
 """Delays that may hold all along."""

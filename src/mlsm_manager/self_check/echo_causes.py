@@ -11,7 +11,7 @@ from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
 from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Cause, Fault, ranked
 from mlsm_manager.self_check.delays import LATE, late, suspected_delays
-from mlsm_manager.self_check.hypotheses import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
+from mlsm_manager.self_check.scan_pairs import AS_TOLD, Change, Hypothesis, ScanPairs, around, evidence_of
 
 _COARSE, _FINE = np.radians(15.0), np.radians(3.0)
 _LENGTHS = 2.0 ** np.arange(-2.0, 1.1, 0.25)  # true over reported: where these are feet, mirrored moves fit better, too

@@ -24,8 +24,8 @@ from mlsm_manager.self_check.course import (
 )
 from mlsm_manager.self_check.delays import late_cause
 from mlsm_manager.self_check.echo_causes import turn_text
-from mlsm_manager.self_check.hypotheses import Hypothesis
 from mlsm_manager.self_check.lengths import assumed_of_distances, assumed_of_lengths, length_causes
+from mlsm_manager.self_check.scan_pairs import Hypothesis
 from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration

@@ -4,7 +4,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.hypotheses import Doubt
+from mlsm_manager.joint_solver.rival_solvers import Doubt
 from mlsm_manager.self_check.verdict import Verdict, merged, percent
 
 _WINDOW, _STEP = 350.0, 14.0  # s: about 25 scans, and between windows about one turn of a head

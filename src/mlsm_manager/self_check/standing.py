@@ -8,7 +8,7 @@ from mlsm_manager.odometry.mending import is_heading_measured, stuck_headings
 from mlsm_manager.odometry.steps import standing_stretches, stands_suddenly
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.causes import Cause, of_stuck
-from mlsm_manager.self_check.hypotheses import FEWEST, MOST, near_pairs
+from mlsm_manager.self_check.scan_pairs import FEWEST, MOST, near_pairs
 from node_support.geometry import wrapped
 
 _FEWEST_PAIRS = 3

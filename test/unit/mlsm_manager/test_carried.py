@@ -5,7 +5,7 @@ import pytest
 
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
-from mlsm_manager.self_check.hypotheses import AS_TOLD, ScanPairs
+from mlsm_manager.self_check.scan_pairs import AS_TOLD, ScanPairs
 
 SPEED, TURN, SCANS, ECHOES = 0.3, 15.0, 16, 120  # m/s along x, s, turns of the head, echoes of each
 SEEN, WIDTH, NOISE = 15.0, 12.0, 0.1  # m: how far along both walls the sonar hears, between them, and of an echo

@@ -27,24 +27,24 @@ def localised(**changes):
     taken = scans(4)
     found = np.array([localiser.take_scan(scan).scan.belief.theta[:2] for scan in taken])
     off = np.hypot(*(found - [[SPEED * 16.0 * turn, 0.0] for turn in range(len(taken))]).T)
-    return off, localiser.estimator.hypotheses
+    return off, localiser.estimator.rivals
 
 
 def test_while_the_scale_is_hardly_known_scans_are_found_from_the_second_on():
-    off, hypotheses = localised(odometry=OdometryKind.AUTO)
-    assert 2 in hypotheses.shown.fixes.by_node
+    off, rivals = localised(odometry=OdometryKind.AUTO)
+    assert 2 in rivals.shown.fixes.by_node
     assert off[1:].max() < 0.3
 
 
 def test_where_a_scan_was_found_both_odometries_lead_to_it():
-    _, hypotheses = localised(odometry=OdometryKind.AUTO)
-    assert hypotheses.doubt.apart < 0.1
-    assert hypotheses.shown.estimates[-1].stated_deviation < 0.3
+    _, rivals = localised(odometry=OdometryKind.AUTO)
+    assert rivals.doubt.apart < 0.1
+    assert rivals.shown.estimates[-1].stated_deviation < 0.3
 
 
 def test_where_the_scale_is_known_no_scan_is_searched():
-    _, hypotheses = localised(odometry=OdometryKind.DVL)
-    assert not hypotheses.shown.fixes.by_node
+    _, rivals = localised(odometry=OdometryKind.DVL)
+    assert not rivals.shown.fixes.by_node
 
 
 @pytest.mark.parametrize(("metres", "is_found"), [(0.0, True), (1.0, False)])

@@ -1,4 +1,4 @@
-"""Causes found by trying: under the right hypothesis about mounts and odometry, scans lie on each other.
+"""Pairs of scans: under the right hypothesis about mounts and odometry they lie on each other.
 
 Honest errors come first: what currents, scales and compasses do the solver's path shows, which every cause must beat.
 """

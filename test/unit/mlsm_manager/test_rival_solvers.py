@@ -8,8 +8,8 @@ from made_harbour import SONAR_IN_BASE, ahead, reporting, tour
 from made_models import followed
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
-from mlsm_manager.joint_solver.hypotheses import Doubt, Hypotheses, likelier
 from mlsm_manager.joint_solver.motion_models import SCALE
+from mlsm_manager.joint_solver.rival_solvers import Doubt, RivalSolvers, likelier
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.self_check.path_checks import odometry_decided
@@ -29,62 +29,62 @@ def scans_of(scale):
     return [reporting(scan, 1.0 / (1.0 + scale)) for scan in MADE.scans]
 
 
-def taken(hypotheses, scans):
+def taken(rivals, scans):
     """Return the estimates after each of `scans`, as shown then."""
-    return [hypotheses.add(scan) for scan in scans]
+    return [rivals.add(scan) for scan in scans]
 
 
 @lru_cache(maxsize=None)
 def run(scale):
     """Return the solvers after the whole tour, and what was shown on the way."""
-    hypotheses = Hypotheses.begun(AUTO, SONAR_IN_BASE)
-    return hypotheses, taken(hypotheses, scans_of(scale))
+    rivals = RivalSolvers.begun(AUTO, SONAR_IN_BASE)
+    return rivals, taken(rivals, scans_of(scale))
 
 
 def test_an_odometry_that_is_right_is_taken_for_a_dvl():
-    hypotheses, shown = run(0.0)
+    rivals, shown = run(0.0)
     named = followed(MADE.scans, PARAMETERS[OdometryKind.DVL])
-    assert hypotheses.told.startswith("DVL, ")
-    assert hypotheses.shown.odometry is AUTO.odometry.rival
+    assert rivals.told.startswith("DVL, ")
+    assert rivals.shown.odometry is AUTO.odometry.rival
     for estimate, other in zip(shown[10:], named.estimates[10:]):
         np.testing.assert_allclose(estimate.T_map_base, other.T_map_base, atol=1e-9)
         assert np.trace(estimate.pose_covariance) >= np.trace(other.pose_covariance)
 
 
 def test_an_odometry_that_is_30_percent_off_is_not():
-    hypotheses, shown = run(0.3)
-    assert hypotheses.told.startswith("THRUSTERS, ")
+    rivals, shown = run(0.3)
+    assert rivals.told.startswith("THRUSTERS, ")
     assert shown[-1].node[SCALE] == pytest.approx(0.3, abs=0.06)
 
 
 @pytest.mark.parametrize("scale", [0.0, 0.1, 0.3])
 def test_the_stated_deviation_covers_the_error_before_and_after_the_echoes_tell(scale):
-    hypotheses, shown = run(scale)
-    start = hypotheses.shown.log.node_poses(np.array([0]))[0] - MADE.truth.at(0.0)
+    rivals, shown = run(scale)
+    start = rivals.shown.log.node_poses(np.array([0]))[0] - MADE.truth.at(0.0)
     for estimate in shown:
         error = estimate.T_map_base - MADE.truth.at(estimate.time) - start
         assert np.hypot(*error[:2]) < 3.0 * estimate.stated_deviation + 0.1
 
 
 def test_a_model_that_is_out_of_the_question_is_followed_no_more():
-    hypotheses, _ = run(0.6)
-    assert hypotheses.other is None
-    assert hypotheses.told.endswith(", more than 1000 times likelier than DVL")
-    assert odometry_decided(hypotheses.doubt) == ()
+    rivals, _ = run(0.6)
+    assert rivals.other is None
+    assert rivals.told.endswith(", more than 1000 times likelier than DVL")
+    assert odometry_decided(rivals.doubt) == ()
 
 
 def test_a_named_odometry_has_no_rival():
-    named = Hypotheses.begun(PARAMETERS[OdometryKind.DVL], SONAR_IN_BASE)
+    named = RivalSolvers.begun(PARAMETERS[OdometryKind.DVL], SONAR_IN_BASE)
     taken(named, MADE.scans[:2])
     assert named.solvers == [named.shown]
     assert named.told == ""
 
 
 def test_a_stored_run_goes_on_with_both():
-    whole, begun = (Hypotheses.begun(AUTO, SONAR_IN_BASE) for _ in range(2))
+    whole, begun = (RivalSolvers.begun(AUTO, SONAR_IN_BASE) for _ in range(2))
     estimates = taken(whole, MADE.scans[:8])
     taken(begun, MADE.scans[:6])
-    resumed = Hypotheses.resumed(AUTO, SONAR_IN_BASE, MADE.scans[:6], begun.stored())
+    resumed = RivalSolvers.resumed(AUTO, SONAR_IN_BASE, MADE.scans[:6], begun.stored())
     later = taken(resumed, MADE.scans[6:8])
     np.testing.assert_allclose(later[-1].pose_covariance, estimates[-1].pose_covariance, rtol=1e-6)
     assert resumed.told == whole.told
@@ -92,12 +92,12 @@ def test_a_stored_run_goes_on_with_both():
 
 @pytest.mark.parametrize("scale", [0.0, 0.3])
 def test_the_fit_of_a_whole_run_takes_what_all_its_echoes_speak_for(scale):
-    hypotheses = Hypotheses.begun(AUTO, SONAR_IN_BASE)
-    taken(hypotheses, scans_of(scale))
-    hypotheses.show_other()  # what is wrong
-    fit = hypotheses.believed([fit_of(solver.solution) for solver in hypotheses.solvers])
+    rivals = RivalSolvers.begun(AUTO, SONAR_IN_BASE)
+    taken(rivals, scans_of(scale))
+    rivals.show_other()  # what is wrong
+    fit = rivals.believed([fit_of(solver.solution) for solver in rivals.solvers])
     assert fit.state.nodes[-1, SCALE] == pytest.approx(scale, abs=0.05)
-    assert fit.state.nodes.shape[1] == hypotheses.shown.odometry.width
+    assert fit.state.nodes.shape[1] == rivals.shown.odometry.width
 
 
 def test_a_scale_that_does_not_change_is_the_same_all_along_a_fit():

@@ -36,7 +36,7 @@ class Doubt(NamedTuple):
     own: float
 
 
-class Hypotheses:
+class RivalSolvers:
     """The solvers of a run: one, or, where its odometry has a rival, one for each. All have one log.
 
     shown: the solver that is believed. other: that of the other odometry; None where there is none, or it is out of the
@@ -53,15 +53,15 @@ class Hypotheses:
     def begun(
         cls, parameters: SolverParameters, sonar_in_base: np.ndarray, start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
-    ) -> "Hypotheses":  # fmt: skip
+    ) -> "RivalSolvers":  # fmt: skip
         """Return those of a new run; arguments as LiveSolver's."""
         solver = LiveSolver(parameters, RunLog(sonar_in_base), start, known)
         return cls(solver, _of_rival(solver))
 
-    def begun_with(self, parameters: SolverParameters) -> "Hypotheses":
+    def begun_with(self, parameters: SolverParameters) -> "RivalSolvers":
         """Return those with other parameters that begin where these began and have taken no scan."""
         solver = self.shown.begun_with(parameters, RunLog(self.shown.log.sonar_in_base))
-        return Hypotheses(solver, _of_rival(solver))
+        return RivalSolvers(solver, _of_rival(solver))
 
     @property
     def parameters(self) -> SolverParameters:
@@ -85,7 +85,7 @@ class Hypotheses:
     def resumed(
         cls, parameters: SolverParameters, sonar_in_base: np.ndarray, scans: Sequence[Scan],
         stored: Mapping[str, np.ndarray],
-    ) -> "Hypotheses":  # fmt: skip
+    ) -> "RivalSolvers":  # fmt: skip
         """Return those that go on after `scans`. Raises as LiveSolver.resumed does, and RefusedInput."""
         log = RunLog(sonar_in_base)
         log.take(scans, parameters.parts_per_turn, parameters.lookahead)
