@@ -3,7 +3,7 @@
 import threading
 from collections import deque
 from itertools import takewhile
-from typing import Callable, Deque, List, Optional, Sequence, Tuple
+from typing import Callable, Deque, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.beam_causes import head_causes
 from mlsm_manager.self_check.causes import (
     NOTHING_ASSUMED,
+    Assumption,
     Cause,
     Fault,
     Suspicion,
@@ -43,6 +44,35 @@ wrong one."""
 _MOST_PLACES = 20000  # four days of scans of 16 s
 _BEFORE = 20.0  # s of beams before a scan: whether the head stands is told by some seconds of them
 _MOST_BEAMS = 20000  # of the newest scans: 30 of a head that takes 400 steps a turn are 12000
+
+
+class _Newest(NamedTuple):
+    """What is looked at. corrections: T_map_odom at the end of each scan. track: T_odom_base of all.
+
+    places: of all scans so far, the object that a jump of the clock replaces. begin: (2,) m in map, the first of them.
+    """
+
+    scans: List[Scan]
+    beams: List[Beam]
+    corrections: Track
+    track: Track
+    places: Deque[Tuple[float, float, float]]
+    begin: np.ndarray
+
+    @property
+    def path(self) -> np.ndarray:
+        """T_map_base (n, 3) at the times of `track`."""
+        return composed(self.corrections.at(self.track.times), self.track.poses)
+
+
+class _Found(NamedTuple):
+    """What one look finds; see MotionFindings. spread: (2, 2) m^2, what other paths add to the newest place."""
+
+    causes: List[Cause]
+    course: CourseFound
+    assumed: Assumption
+    spread: np.ndarray = np.zeros((2, 2))
+    by_mounts: float = 0.0
 
 
 class LiveCauses:
@@ -100,37 +130,39 @@ class LiveCauses:
         newest_run: gives that of these scans, as it is solved; None where no solver follows them. steps: of the
         odometry, which were left out.
         """
-        with self._lock:
-            if not self._is_new or len(self._scans) < _FEWEST:
-                return
-            self._is_new, scans, places = False, list(self._scans), self._places
-            while self._beams and self._beams[0].stamp_ns * 1e-9 < scans[0].start:
-                self._beams.popleft()
-            beams = list(self._beams)
-            begin = np.array(places[0][1:])
-            corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
-        track = joined([scan.track for scan in scans])
-        of_echoes, _, suspected = echo_findings(scans, self.sonar_in_base, corrections)
-        path = composed(corrections.at(track.times), track.poses)
-        of_head = [*of_standing(self._head_stood(beams)), *head_causes(beams)]
-        of_beams = [*of_head, *standing_causes(scans, track, path)]
-        spread, by_mounts = np.zeros((2, 2)), 0.0
-        course, assumed = self._course, self._assumed
-        found = [*of_echoes, *of_beams]
+        newest = self._taken_since()
+        if newest is None:
+            return
+        of_echoes, _, suspected = echo_findings(newest.scans, self.sonar_in_base, newest.corrections)
+        of_beams = [*of_standing(self._head_stood(newest.beams)), *head_causes(newest.beams)]
+        of_beams += standing_causes(newest.scans, newest.track, newest.path)
+        found = _Found([*of_echoes, *of_beams], self._course, self._assumed)
         run = newest_run()
         if run is not None:
             # What a stuck compass missed is not tried: the path is not mended live.
-            shown = [cause.fault for cause in found if cause.fault is not None]
+            shown = [cause.fault for cause in found.causes if cause.fault is not None]
             shown = [fault for fault in shown if fault.kind is not FaultKind.STUCK]
             suspected = [*suspected, *shown, *_misread(steps, run.log.node_times[0])]
-            motion = _motion_of(run, suspected, track.with_poses(path), begin, course)
-            found, by_mounts, course = motion.told_with(of_echoes, of_beams), motion.by_mounts, motion.course
-            spread, assumed = motion.spread(run.log.node_times[-1:])[0], motion.assumed
-        found += [of_stuck(*one) for one in stuck_headings(track)]
+            motion = _motion_of(run, suspected, newest, self._course)
+            spread = motion.spread(run.log.node_times[-1:])[0]
+            causes = motion.told_with(of_echoes, of_beams)
+            found = _Found(causes, motion.course, motion.assumed, spread, motion.by_mounts)
+        stuck = [of_stuck(*one) for one in stuck_headings(newest.track)]
         with self._lock:
-            if self._places is places:
-                self._learn(found, spread, by_mounts, scans[0].start)
-                self._course, self._assumed = course, assumed
+            if self._places is newest.places:
+                self._learn(found._replace(causes=[*found.causes, *stuck]), newest.scans[0].start)
+
+    def _taken_since(self) -> Optional[_Newest]:
+        """Return the newest scans and beams; None where no scan came since they were returned last, or too few."""
+        with self._lock:
+            if not self._is_new or len(self._scans) < _FEWEST:
+                return None
+            self._is_new, scans = False, list(self._scans)
+            while self._beams and self._beams[0].stamp_ns * 1e-9 < scans[0].start:
+                self._beams.popleft()
+            corrections = Track(np.array([scan.reference_time for scan in scans]), np.array(self._corrections))
+            track = joined([scan.track for scan in scans])
+            return _Newest(scans, list(self._beams), corrections, track, self._places, np.array(self._places[0][1:]))
 
     def _head_stood(self, beams: Sequence[Beam]) -> List[HeadStood]:
         """Return when the head stood, of some beams; if in all of them, earlier ones tell that it turned."""
@@ -139,18 +171,19 @@ class LiveCauses:
             self._usual_difference = max(self._usual_difference, usual)
         return stood
 
-    def _learn(self, found: List[Cause], spread: np.ndarray, by_mounts: float, begin: float) -> None:
+    def _learn(self, found: _Found, begin: float) -> None:
         """Remember what scans from `begin` [s] on show, and what those before showed: the place is wrong ever after.
 
         A weak cause is named after two looks in a row have found it.
         """
-        self._shown, before = found, self._shown
-        found = [one for one in found if one.evidence > _AT_ONCE or any(is_alike(one, other) for other in before)]
-        kinds = {cause.fault.kind for cause in found if cause.fault is not None}
+        self._course, self._assumed = found.course, found.assumed
+        self._shown, before = found.causes, self._shown
+        named = [one for one in self._shown if one.evidence > _AT_ONCE or any(is_alike(one, other) for other in before)]
+        kinds = {cause.fault.kind for cause in named if cause.fault is not None}
         past = [cause for cause in self._found if cause.begin < begin and cause.fault is not None]
-        self._found = [*found, *(cause for cause in past if cause.fault.kind not in kinds)]
-        if not self._found or np.trace(spread) > np.trace(self._spread):
-            self._spread, self.by_mounts = spread, by_mounts
+        self._found = [*named, *(cause for cause in past if cause.fault.kind not in kinds)]
+        if not self._found or np.trace(found.spread) > np.trace(self._spread):
+            self._spread, self.by_mounts = found.spread, found.by_mounts
 
     @property
     def assumed(self) -> str:
@@ -178,16 +211,14 @@ def _misread(steps: Sequence[Step], begin: float) -> List[MotionFault]:
     return [step.misread for step in steps if step.misread is not None and step.begin > begin]
 
 
-def _motion_of(
-    run: Solution, suspected: Sequence[Fault], mapped: Track, begin: np.ndarray, before: CourseFound
-) -> MotionFindings:  # fmt: skip
-    """Return what speaks against odometry and sonar of a run, and what its course says of the mount, or said `before`.
+def _motion_of(run: Solution, suspected: Sequence[Fault], newest: _Newest, before: CourseFound) -> MotionFindings:
+    """Return what speaks against odometry and sonar of a run, and what its course tells of the mount.
 
-    mapped: T_map_base of these scans. begin: (2,) m in map, from where the vehicle was followed.
+    before: what its course told before.
     """
     track = run.log.odometry.track_from(-np.inf)
     motion = with_other_places(without_faults(run, fit_of(run), track, Suspicion(suspected)))
     solved, first = track.with_poses(motion.run.path(track.times)), run.log.node_times[:1]
     # A part of a run is solved about its own first place.
-    apart = (solved.at(first) - mapped.at(first))[0, :2]
-    return motion.with_newest_course(solved, begin + apart, before)
+    apart = (solved.at(first) - newest.track.with_poses(newest.path).at(first))[0, :2]
+    return motion.with_newest_course(solved, newest.begin + apart, before)
