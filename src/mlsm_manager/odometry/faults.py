@@ -11,6 +11,7 @@ from node_support.geometry import harmonics, rotated, seen_from
 
 # rad and relative: a marina's unbroken compass errs by 3 degrees with the heading, a DVL by three times 1 percent.
 _USUAL_HEADING, _USUAL_LENGTH = np.radians(4.0), 0.04
+_LONGEST = np.log(5.0)  # reported over true distances: of a vehicle that seems to stand all scans lie on each other
 _DAMPING = 1.0  # nodes' worth against harmonics that the headings of a run do not tell apart
 _SIDE = 0.15  # of the run, at both ends, in which nothing tells a change from what holds all along
 
@@ -98,6 +99,10 @@ class MotionFault:
             return True
         size = float(np.linalg.norm(self.sizes)) * (end - self.begin if self.kind in _GROWING else 1.0)
         return size > (_USUAL_LENGTH if self.kind in OF_DISTANCES else _USUAL_HEADING)
+
+    @property
+    def is_possible(self) -> bool:
+        return self.kind not in OF_DISTANCES or self.sizes[0] > -_LONGEST
 
     def mended(self, track: Track) -> Track:
         """Return T_odom_base without the fault; positions are reckoned anew, as the vehicle did from its heading.

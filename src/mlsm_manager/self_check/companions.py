@@ -4,6 +4,7 @@ from dataclasses import replace
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
+from scipy.ndimage import binary_propagation
 
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import CERTAIN, Cause
@@ -12,6 +13,8 @@ from sonar_processing.beams.beam import PlacedBeam, beam_directions
 _SECTORS, _CELL = 36, 0.2  # of the circle; m, of the range
 _SECTOR = 2.0 * np.pi / _SECTORS
 _MOSTLY = 0.8  # share of a sector's beams that hear it at one range, while the vehicle moves and all else does
+_STRETCHES = 4  # of the recording: with more gain, echoes of a companion become longer
+_ALONG_BEAMS = np.array([[0, 0, 0], [1, 1, 1], [0, 0, 0]])
 _NARROWEST = 2  # sectors beside each other
 _WIDEST = 2.0 / 3.0  # of those looked at: a ring all around is the floor or the pulse, which echo_extractor removes
 _ELSEWHERE = 0.25  # share of the beams of all other sectors: in a tank, walls are as far wherever the vehicle turns
@@ -30,7 +33,8 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
         return list(beams), []
     angles = np.array([one.beam.angle for one in beams])
     sectors = ((angles % (2.0 * np.pi)) / (2.0 * np.pi) * _SECTORS).astype(int) % _SECTORS
-    goes_along = _heard_always(beams, sectors)
+    loud, looked = _loudness(beams, sectors)
+    goes_along = _heard_always(loud.sum(axis=0), looked.sum(axis=0), sectors)
     if goes_along is None:
         return list(beams), []
     pointing = goes_along.any(axis=1)[sectors]
@@ -39,6 +43,7 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     if _may_be_wall(goes_along) and not _is_heard_everywhere(track, towards, heard):
         return list(beams), []
     near = _in_range(goes_along | _in_next_sectors(goes_along))
+    near = binary_propagation(near, _ALONG_BEAMS, near | _in_range(_mostly(loud, looked).any(axis=0)))
     metres, width = _CELL * (0.5 + np.nonzero(goes_along)[1].min()), goes_along.any(axis=1).sum() * 360 // _SECTORS
     text = f"something {metres:.1f} m away goes along with the vehicle, in {width} deg of the circle"
     left = [_without(one, near[sector]) for one, sector in zip(beams, sectors)]
@@ -67,18 +72,33 @@ def _is_heard_everywhere(track: Track, beams: Sequence[PlacedBeam], heard: np.nd
     return bool((np.ptp(values, axis=0) >= _LEAVES).any() and (ends > _AT_ENDS).all())
 
 
-def _heard_always(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Optional[np.ndarray]:
-    """Return in which cells (sectors, cells) most beams are loud; None where that is no companion."""
-    count = 1 + max(int(_cells(one).max()) for one in beams)
-    loud, looked = np.zeros((_SECTORS, count)), np.bincount(sectors, minlength=_SECTORS)
+def _loudness(beams: Sequence[PlacedBeam], sectors: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return how many beams are loud in each cell (stretches, sectors, cells), of how many (stretches, sectors)."""
+    loud = np.zeros((_STRETCHES, _SECTORS, 1 + max(int(_cells(one).max()) for one in beams)))
+    looked = np.zeros((_STRETCHES, _SECTORS))
+    stretches = np.arange(len(beams)) * _STRETCHES // len(beams)
+    np.add.at(looked, (stretches, sectors), 1.0)
+    for one, stretch, sector in zip(beams, stretches, sectors):
+        loud[stretch, sector, _loud(one)] += 1.0
+    return loud, looked
+
+
+def _heard_always(loud: np.ndarray, looked: np.ndarray, sectors: np.ndarray) -> Optional[np.ndarray]:
+    """Return in which cells (sectors, cells) most beams are loud; None where that is no companion.
+
+    loud, looked: of all beams; see `_loudness`. sectors: (n,) of each beam.
+    """
     entered = np.bincount(sectors[np.diff(sectors, prepend=-1) != 0], minlength=_SECTORS) >= _FEWEST
-    for one, sector in zip(beams, sectors):
-        loud[sector, _loud(one)] += 1.0
-    always = (loud > _MOSTLY * looked[:, np.newaxis]) & entered[:, np.newaxis]
+    always = _mostly(loud, looked) & entered[:, np.newaxis]
     widest = _WIDEST * np.count_nonzero(entered)
     always[:, (always.sum(axis=0) > widest) | (_share(loud, looked, ~always) > _ELSEWHERE)] = False
     always &= _in_range(_in_next_sectors(always))
     return always if _NARROWEST <= always.any(axis=1).sum() <= widest else None
+
+
+def _mostly(loud: np.ndarray, looked: np.ndarray) -> np.ndarray:
+    """Return in which cells (..., sectors, cells) most of the beams that look (..., sectors) are loud."""
+    return loud > _MOSTLY * looked[..., np.newaxis]
 
 
 def _share(loud: np.ndarray, looked: np.ndarray, chosen: np.ndarray) -> np.ndarray:

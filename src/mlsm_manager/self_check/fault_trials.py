@@ -137,7 +137,8 @@ def _likely(errors: OdometryErrors) -> List[Fault]:
     changed = next(one for one in found if one.kind is FaultKind.DISTANCES)
     number = int(np.searchsorted(errors.times, changed.begin))
     begins = errors.times[max(number - _EARLIER, 1) : number + _LATER]
-    return [*found, *ranges_changed_at(begins.tolist(), -changed.sizes[0])]
+    possible = [fault for fault in found if fault.is_possible]
+    return [*possible, *ranges_changed_at(begins.tolist(), -changed.sizes[0])]
 
 
 def _of_sonar(found: MotionFindings) -> List[SonarFault]:
@@ -221,9 +222,7 @@ def _beside(fault: Fault) -> List[Fault]:
         return []
     if fault.kind is FaultKind.SLIPS_ON:
         return [fault.times(factor) for factor in _ABOUT]
-    if not isinstance(fault, SonarFault):
-        return [fault.times(factor) for factor in _LARGER]
-    others = [fault.times(factor) for factor in _BESIDE]
+    others = [fault.times(factor) for factor in (_BESIDE if isinstance(fault, SonarFault) else _LARGER)]
     if fault.kind is SonarKind.RANGES:
         others += [replace(fault, begin=fault.begin + seconds) for seconds in _SECONDS]
     return [other for other in others if other.is_possible]

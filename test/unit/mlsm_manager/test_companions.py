@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from made_recordings import touring
 
@@ -22,6 +23,14 @@ def test_what_goes_along_with_the_vehicle_is_left_out():
     ]
     assert not any(one.beam.intensities[round(5.0 / one.beam.range_resolution) + 1] for one in beams[:3])
     assert without_companions(WHOLE.beams, WHOLE.track) == (WHOLE.beams, [])
+
+
+def test_it_is_left_out_also_where_its_echoes_become_longer():
+    heard = broken.echoes_longer(rare.hull_heard(WHOLE, 5.0), 0.6 * WHOLE.seconds, 10)
+    beams, _ = without_companions(heard.beams, WHOLE.track)
+    towards = [one.beam for one in beams[-400:] if np.cos(one.beam.angle) > 0.5]
+    near = slice(*np.round(np.array([5.0, 7.5]) / towards[0].range_resolution).astype(int))
+    assert not np.concatenate([beam.intensities[near] for beam in towards]).any()
 
 
 def _beams(angles, ranges):

@@ -71,6 +71,11 @@ def test_a_fault_is_told_as_what_the_odometry_did(fault, said):
     assert fault.text == said
 
 
+@pytest.mark.parametrize(("size", "is_possible"), [(-1.5, True), (-1.7, False), (1.7, True)])
+def test_distances_are_not_reported_so_long_that_the_vehicle_would_stand(size, is_possible):
+    assert replace(DISTANCES, sizes=(size,)).is_possible == is_possible
+
+
 @pytest.fixture(scope="module")
 def halved():
     """Return what is found of an odometry that reports half of each distance from the middle on."""
