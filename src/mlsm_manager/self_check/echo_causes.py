@@ -35,7 +35,7 @@ _COMPARED = 60  # pairs of scans: more tell nothing new
 # Of how far scans lie apart that are turned against each other. Where headings, angles or echoes make no sense, a fit
 # leaves them .86 to 1.0 times as far apart, in other broken recordings .2 to .8, in unbroken ones .2 to .65.
 _NO_BETTER = 0.84
-_ASTRAY = 0.25  # of the way: so far off is a path whose steps go anywhere
+_ASTRAY = 0.4  # of the way: 2.5 such deviations are all of it, and no vehicle went farther
 _SENSELESS = Cause(
     "scans lie on each other no better than if they were turned at random: headings, angles of the head or echoes make "
     "no sense", CERTAIN,
@@ -82,9 +82,10 @@ def echo_findings(
     if is_named:
         turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
         return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
-    named = [cause for cause in carried(pairs, honest, _CARRIED)[:1] if cause.evidence > NAMED_FROM]
+    currents = carried(pairs, honest, _CARRIED)
+    named = [cause for cause in currents[:1] if cause.evidence > NAMED_FROM]
     # A path that gave way to a current hides it: it is suspected of the odometry itself.
-    suspected = [cause.fault for cause in carried(pairs, AS_TOLD)] if not named else []
+    suspected = [cause.fault for cause in (currents[1:] if named else carried(pairs, AS_TOLD))]
     found = [*late(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
     aside = pairs.best(around(AS_TOLD, "turn", _ASIDE))
     suspected += [*_suspected_slips(pairs, slipping, aside), *suspected_delays(pairs, aside)]
