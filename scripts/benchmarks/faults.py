@@ -43,7 +43,7 @@ def source(name: str, seconds: float) -> Recording:
     if name.endswith(_COMPASS):
         return source(name[: -len(_COMPASS)], seconds).without_positions()
     if name == "marina":
-        return shortened(marina(), seconds)
+        return shortened(marina(truth="/ground_truth"), seconds)
     if name == "canal":
         return ending(read_recording(recorded(WHOLE_MARINA), Request()), seconds)
     return shortened(simulated(f"{_TOURS[name]}_tour").with_dvl(1), seconds)
