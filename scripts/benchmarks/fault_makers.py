@@ -9,7 +9,7 @@ from typing import Callable, Optional
 
 import numpy as np
 
-from mlsm_manager.odometry.faults import integrated
+from mlsm_manager.odometry.changed_tracks import integrated
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices, move_of, seen_from

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from benchmarks.fault_makers import after, changed, mounted, stamped, steps_of, with_compass_error, with_odometry
-from mlsm_manager.odometry.faults import integrated
+from mlsm_manager.odometry.changed_tracks import integrated
 from mlsm_manager.offline.recording import Recording
 from sonar_processing.beams.beam import Beam
 

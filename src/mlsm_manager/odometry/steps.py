@@ -8,7 +8,8 @@ from typing import Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.odometry.faults import FaultKind, MotionFault, integrated
+from mlsm_manager.odometry.changed_tracks import integrated
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import seen_from, wrapped
 from node_support.parameters import ParameterSet, parameter
@@ -81,9 +82,9 @@ class Step:
         The course of a vehicle wanders by as much as small steps of its compass.
         """
         if self.kind is StepKind.COMPASS:
-            return MotionFault(FaultKind.RIGHT, self.time, (self.turn,))
+            return MotionFault(FaultKind.STEP_ALONE, self.time, (self.turn,))
         if self.kind is StepKind.COMPASS_ALONE:
-            return MotionFault(FaultKind.FOLLOWED, self.time, (-self.turn,))
+            return MotionFault(FaultKind.STEP_FOLLOWED, self.time, (-self.turn,))
         return None
 
     @property

@@ -9,7 +9,7 @@ import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind
-from mlsm_manager.odometry.faults import Mirror
+from mlsm_manager.odometry.changed_tracks import Mirror
 from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.causes import CERTAIN, Cause

@@ -7,7 +7,7 @@ from typing import List, Optional, Sequence, Tuple
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
-from mlsm_manager.odometry.faults import Mirror
+from mlsm_manager.odometry.changed_tracks import Mirror
 from mlsm_manager.offline.heard_scans import heard_in, progress_bar
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.refinement import Refined

@@ -6,7 +6,8 @@ from typing import List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
-from mlsm_manager.odometry.faults import FaultKind, Mirror, MotionFault, with_headings_reversed, with_positions_turned
+from mlsm_manager.odometry.changed_tracks import Mirror, with_headings_reversed, with_positions_turned
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
 from mlsm_manager.self_check.carried import carried
 from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Assumption, Cause, Fault, ranked

@@ -9,7 +9,7 @@ from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.surface_points import LEAST_REACH, surface_normals
-from mlsm_manager.odometry.faults import Mirror
+from mlsm_manager.odometry.changed_tracks import Mirror
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.compiled_distances import along_x, mean_distance
 from node_support.geometry import composed, inverse, rotated, seen_from, transformed
