@@ -46,7 +46,7 @@ def heard_in(
     if found.mount != AS_TOLD and found.mount.mirrored is Mirror.NOTHING:
         recording = recording.mounted(found.mount.turn, found.mount.is_over)
         scans = _scans(recording, extractor, options)
-        mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION) for cause in found.causes]
+        mended = [replace(cause, is_mended=True, turn=TURN_DEVIATION, metres=0.0) for cause in found.causes]
     signs = z_down_signs(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams]), scans)
     _warn_of_z_down(signs, options)
     if kind not in COMPASS_ONLY or not signs.turns().fires:

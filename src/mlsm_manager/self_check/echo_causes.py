@@ -81,8 +81,9 @@ def echo_findings(
         of_delay = [] if is_named or _is_chance(pairs, pairs.best(LATE)) else late(pairs, honest)
         return EchoFindings([_astray(cause, pairs) for cause in of_delay or [_SENSELESS]], AS_TOLD)
     if is_named:
-        turn = np.pi if is_flipped else abs(best.turn)  # if it is the odometry, the path is mirrored
-        return EchoFindings([Cause(turn_text(best), nats, turn=turn)], best)
+        cause = Cause(turn_text(best), nats, turn=abs(best.turn))
+        # No scan lies on another then, so that the path goes anywhere; if it is the odometry, it is mirrored.
+        return EchoFindings([_astray(cause, pairs) if is_flipped else cause], best)
     currents = carried(pairs, honest, _CARRIED)
     named = [cause for cause in currents[:1] if cause.evidence > NAMED_FROM]
     # A path that gave way to a current hides it: it is suspected of the odometry itself.
