@@ -10,7 +10,8 @@ from scipy.ndimage import maximum_filter1d
 
 from node_support.geometry import members
 
-_ONE_STRENGTH = 0.9  # share of the strengths above 0 that equal the strongest
+_AS_STRONG = 0.9  # of the strongest in a turn, in which a gain that fades changes little
+_ONE_STRENGTH = 0.9  # share of the strengths above 0 that are as strong; real heads and a simulated one have up to 0.26
 _QUANTILE = 0.4  # over the beams of a turn: what is heard in most directions at a range is no echo
 _LEVEL = 0.75  # of the autocorrelation: high on its flank, where slanting walls lengthen the echoes least
 _LEAST, _MOST = 0.15, 2.0  # m: a pulse of 0.2 ms, and a wall that a wide beam meets aslant
@@ -35,7 +36,7 @@ class EchoStatistics:
     def __init__(self, bins: int, range_resolution: float) -> None:
         """bins: of every beam. range_resolution: length of a bin, m."""
         self._resolution = range_resolution
-        self._strongest, self._as_strong, self._heard = 0.0, 0, 0
+        self._as_strong, self._heard = 0, 0
         self._correlation = np.zeros(bins)
 
     def has_bins(self, bins: int, range_resolution: float) -> bool:
@@ -45,12 +46,9 @@ class EchoStatistics:
     def add(self, strengths: np.ndarray) -> None:
         """Take the beams of a turn: (beams, bins), any numeric type."""
         self._correlation += _autocorrelation(strengths.astype(np.float32))
-        strongest = float(strengths.max(initial=0))
-        if strongest > self._strongest:
-            self._strongest, self._as_strong = strongest, 0
-        self._heard += int(np.count_nonzero(strengths > 0))
-        if self._strongest > 0.0:
-            self._as_strong += int(np.count_nonzero(strengths == self._strongest))
+        is_heard = strengths > 0
+        self._heard += int(np.count_nonzero(is_heard))
+        self._as_strong += int(np.count_nonzero(is_heard & (strengths >= _AS_STRONG * strengths.max(initial=0))))
 
     @property
     def shape(self) -> EchoShape:

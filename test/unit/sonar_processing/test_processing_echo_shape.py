@@ -34,6 +34,12 @@ def test_strengths_that_say_something_or_nothing_are_plateaus_and_those_that_dif
     assert heard([strengths]).shape is shape
 
 
+@pytest.mark.parametrize("gains", [np.repeat([1.0, 0.3, 2.0], 120), 0.3 ** np.linspace(0.0, 1.0, 3600)])
+def test_plateaus_are_known_as_such_while_the_gain_changes(gains):
+    strengths = (127.0 * gains[:, np.newaxis] * (echoing(0.5, beams=len(gains)) > 20.0)).astype(np.uint8)
+    assert heard(*np.split(strengths, len(gains) // 120)).shape is EchoShape.PLATEAU
+
+
 def test_a_turn_of_few_equal_strengths_is_outvoted_by_later_ones():
     one_echo = np.zeros((120, 400))
     one_echo[0, 100] = 30.0
