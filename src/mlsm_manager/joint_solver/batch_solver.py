@@ -54,6 +54,31 @@ class BatchResult:
 
 
 @dataclass(frozen=True)
+class QuickFit:
+    """A fit of a whole run without covariances, which take as long as the fit itself: many are tried, and one is taken.
+
+    run: as it began. state, steps, converged, log_likelihood: see BatchResult.
+    """
+
+    run: Solution
+    state: State
+    steps: int
+    converged: bool
+    log_likelihood: float
+
+    @classmethod
+    def of(cls, run: Solution) -> "QuickFit":
+        """Return the fit of a run that begins at its state, which stays as it is."""
+        problem = _Batch(run.with_state(run.state.copy()))
+        steps, converged = problem.converge()
+        return cls(run, problem.state, steps, converged, problem.log_likelihood())
+
+    def with_covariances(self) -> BatchResult:
+        """Return the fit with the covariances of its unknowns."""
+        return _result(self.run, _solved_at(self.run, self.state), self.steps, self.converged)
+
+
+@dataclass(frozen=True)
 class PartResult:
     """What a part of a run says of sonar and odometry. node: (width,) the newest one's unknowns. run: (2,).
 
@@ -108,12 +133,21 @@ def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
     problem = _Batch(run.with_state(run.state.copy()), fixed_steps=fixed_steps)
     steps, converged = problem.converge()
     if fixed_steps is not None:
-        problem = _Batch(run.with_state(problem.state))
-        problem.solve(run.parameters.cut)
+        problem = _solved_at(run, problem.state)
+    return _result(run, problem, steps, converged)
+
+
+def _solved_at(run: Solution, state: State) -> "_Batch":
+    """Return the problem of a run as it is solved at a state, which stays."""
+    problem = _Batch(run.with_state(state))
+    problem.solve(run.parameters.cut)
+    return problem
+
+
+def _result(run: Solution, problem: "_Batch", steps: int, converged: bool) -> BatchResult:
     poses, of_run = problem.covariances()
     poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
-    likelihood = problem.log_likelihood()
-    times = run.log.node_times.copy()
+    times, likelihood = run.log.node_times.copy(), problem.log_likelihood()
     return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
 
 

@@ -5,7 +5,7 @@ from typing import Optional, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
+from mlsm_manager.joint_solver.batch_solver import QuickFit
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
@@ -36,7 +36,7 @@ def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     if model is None:
         return None
     freed = replace(run, parameters=replace(run.parameters, odometry=model), state=_for_model(run.state, model))
-    nodes = fit_of(freed).state.nodes
+    nodes = QuickFit.of(freed).state.nodes
     reported = run.log.node_poses(np.arange(len(nodes)))
     scales = np.zeros(len(nodes))
     if not np.isinf(model.distance_deviation):
@@ -50,9 +50,9 @@ def with_odometry(run: Solution, track: Track) -> Solution:
     return replace(run, log=run.log.since(0, OdometryLog.of(track)))
 
 
-def fit_from(run: Solution, starts: Sequence[State]) -> BatchResult:
+def fit_from(run: Solution, starts: Sequence[State]) -> QuickFit:
     """Return the likeliest of the fits of a run that begin at each of `starts`."""
-    return max((fit_of(run.with_state(start)) for start in starts), key=lambda fit: fit.log_likelihood)
+    return max((QuickFit.of(run.with_state(start)) for start in starts), key=lambda fit: fit.log_likelihood)
 
 
 def path_kept(run: Solution, log: RunLog) -> State:

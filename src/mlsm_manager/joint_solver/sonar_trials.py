@@ -6,7 +6,7 @@ from typing import List, Sequence, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, likelihood_of
+from mlsm_manager.joint_solver.batch_solver import BatchResult, QuickFit, likelihood_of
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_trials import fit_from, reckoned
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -120,7 +120,7 @@ class SonarFault:
         return replace(scan, points=transformed(poses, seen))
 
 
-def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, BatchResult]:
+def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, QuickFit]:
     """Return a run without a fault of its sonar, and its fit.
 
     After a change of ranges it begins where the odometry leads, or, where that tells no distances, with a path that is
@@ -159,8 +159,8 @@ def _longer(run: Solution, log: RunLog, fault: SonarFault, first: int) -> np.nda
     return reckoned(run, log, result, (log.node_times[begin], log.node_times[last]))
 
 
-def likelihood_across(run: Solution, fit: BatchResult, fault: SonarFault) -> float:
-    """Return how likely a run, fitted as `fit` says, is by what scans before and after a change tell of each other.
+def likelihood_across(run: Solution, fitted: State, fault: SonarFault) -> float:
+    """Return how likely a run is at the state `fitted` by what scans before and after a change tell of each other.
 
     Scans lie closer to each other the smaller the sonar is said to hear the world, whatever is true: so only those
     count, and they are to lie closer by as much.
@@ -169,7 +169,7 @@ def likelihood_across(run: Solution, fit: BatchResult, fault: SonarFault) -> flo
     parameters = replace(
         run.parameters, echo_deviation=closer * run.parameters.echo_deviation, cut=closer * run.parameters.cut
     )
-    return likelihood_of(replace(run, parameters=parameters, state=fit.state), fault.begin)
+    return likelihood_of(replace(run, parameters=parameters, state=fitted), fault.begin)
 
 
 def ranges_changed_at(begins: Sequence[float], size: float) -> List[SonarFault]:

@@ -5,7 +5,7 @@ from typing import Iterator, List, NamedTuple, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.batch_solver import BatchResult, compared_since, fit_of
+from mlsm_manager.joint_solver.batch_solver import BatchResult, QuickFit, compared_since
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.self_check.causes import Cause
 from mlsm_manager.self_check.motion_findings import MotionFindings
@@ -32,7 +32,7 @@ class Elsewhere(NamedTuple):
 
     begin: float
     run: Solution
-    fit: BatchResult
+    fit: QuickFit
     apart: np.ndarray
     gain: float
 
@@ -57,7 +57,7 @@ def with_other_places(found: MotionFindings) -> MotionFindings:
     if best.gain <= 0.0:
         return replace(found, apart=[*found.apart, farthest.apart])
     beside = max((-best.apart, farthest.apart - best.apart), key=lambda one: float(np.hypot(*one.T).max()))
-    return replace(found, run=best.run, fit=best.fit, apart=[*found.apart, beside])
+    return replace(found, run=best.run, fit=best.fit.with_covariances(), apart=[*found.apart, beside])
 
 
 def other_places(run: Solution, fit: BatchResult) -> List[Elsewhere]:
@@ -73,7 +73,7 @@ def other_places(run: Solution, fit: BatchResult) -> List[Elsewhere]:
     for node, shift in _starts(run.places):
         start = fit.state.copy()
         start.nodes[node:, :2] += shift
-        other = fit_of(run.with_state(start))
+        other = QuickFit.of(run.with_state(start))
         shifted = run.with_state(other.state)
         apart = shifted.places - run.places
         apart -= apart[0]
