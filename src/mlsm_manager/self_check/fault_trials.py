@@ -176,7 +176,7 @@ def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[
 def _rounds(found: MotionFindings, best: _Trial) -> int:
     """Return how many rounds of other sizes are tried: none for a fault of the sonar that is far from being named.
 
-    Each round takes seconds. The first trials of faults that were named in 64 broken recordings gained half of what
+    Each round takes seconds. The first trials of 37 faults that were named in broken recordings gained half of what
     that needs or more, those of a compass alone in an unbroken marina a fifth or less.
     """
     if not isinstance(best.fault, SonarFault):
