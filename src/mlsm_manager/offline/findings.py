@@ -33,6 +33,7 @@ from node_support.parameters import describe
 from sonar_processing.beams.parameters import BeamCorrection
 
 _FEWEST_SCANS = 20  # a window's worth: fewer say too little of scale and delay
+_UNTOLD_ALONE = "with a compass alone nothing tells whether all headings or all ranges are off alike"
 _OF_RUN = ("range_scale_error", "sonar_delay")  # as the solver's unknowns of the run are ordered
 
 
@@ -218,7 +219,9 @@ def _trust(
     # A path that went astray may be far too short, and an odometry without positions has none.
     ways = max((best.places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
     covariances = widened(best.covariances, best.times, ways, causes)
-    return Trust(verdicts, best.times, covariances, replayed.matched, causes).assuming(assumed, ways)
+    is_alone = np.isinf(replayed.solver.odometry.distance_deviation) and np.ptp(replayed.odometry[:, 2]) > 0.0
+    untold = _UNTOLD_ALONE if is_alone else ""
+    return Trust(verdicts, best.times, covariances, replayed.matched, causes, untold=untold).assuming(assumed, ways)
 
 
 def _against_odometry_or_before(

@@ -21,7 +21,7 @@ class Trust:
 
     matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
     nobody measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing
-    tells.
+    tells. untold: a clause of what no check of such a run can tell; empty where there is nothing such.
     """
 
     verdicts: List[Verdict]
@@ -31,6 +31,7 @@ class Trust:
     causes: Sequence[Cause] = ()
     assumed: Assumption = NOTHING_ASSUMED
     if_so: float = np.nan
+    untold: str = ""
 
     def assuming(self, assumed: Assumption, places: np.ndarray) -> "Trust":
         """Return that of a path that rests on what nobody measured: no check is fine, and it lies elsewhere if not so.
@@ -59,6 +60,10 @@ class Trust:
 
     @property
     def line(self) -> str:
+        return f"{self._answered}; {self.untold}" if self.untold else self._answered
+
+    @property
+    def _answered(self) -> str:
         begin = float(self.times[0])
         fine, doubtful, missing = ([one for one in self.verdicts if one.answer is answer] for answer in Answer)
         mended = "".join(f"; mended: {cause.line(begin)}" for cause in self.causes if cause.is_mended)

@@ -174,6 +174,11 @@ def test_of_an_odometry_that_was_put_right_is_said_how_well_the_position_is_know
     assert trust.uncertainty is not None
 
 
+def test_what_no_check_can_tell_is_said_last():
+    trust = replace(trust_of(FINE, matched=7), untold="nothing tells the north")
+    assert trust.line.endswith("nothing contradicts: position within 8.7 m; nothing tells the north")
+
+
 def test_where_something_else_is_wrong_the_line_tells_what_the_position_rests_on():
     trust = replace(trust_of(FIRING), assumed=Assumption("the sonar's ranges are right"), if_so=1.0)
     assert trust.line.endswith("; at best position within 1.7 m if the sonar's ranges are right, within 8.7 m if not")
