@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import rospy
+from dynamic_reconfigure.client import Client
 from foreign_messages import message_classes, sane_message
 from graph import Diagnostics, Inbox, end_publishing, rows, run, wait_for_publisher_links
 from rosgraph_msgs.msg import Log
@@ -91,6 +92,21 @@ class ForeignBeams(unittest.TestCase):
         self.diagnostics.wait_for("sonar_to_cloud", "messages of unknown types", 3)
         self.wait_for_a_turn(MICRON)
         self.assertNotIn("internal errors", self.diagnostics.values("sonar_to_cloud"))
+
+    def test_6_a_sonar_that_is_turned_against_tf_is_put_right_while_it_runs(self) -> None:
+        client = Client("sonar_to_cloud", timeout=10.0)
+        before = self.heard_at()
+        self.assertEqual(client.update_configuration({"sonar_turned": 0.5})["sonar_turned"], 0.5)
+        self.assertAlmostEqual((self.heard_at() - before + np.pi) % (2.0 * np.pi) - np.pi, 0.5, places=2)
+
+    def heard_at(self) -> float:
+        """Publish a beam, and return where it hears the wall: rad, from the sonar, in odom."""
+        beams = Inbox("/sonar/beam", PointCloud2)
+        beams.wait_for_link()
+        self.publish(message_classes(MICRON)[MICRON], [sane_message(MICRON, 20)])
+        cloud = rows(beams.wait_for(lambda _: True))
+        ahead, left = (cloud[cloud[:, 3] == 120][:, :2] - [1.0, 2.0]).mean(axis=0)
+        return float(np.arctan2(left, ahead))
 
 
 if __name__ == "__main__":

@@ -1,12 +1,13 @@
 """One beam of a mechanically scanned sonar, where it was sent, and where its bins lie (thesis 6.5.2)."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Sequence
 
 import numpy as np
 
 from node_support.errors import RefusedInput
+from node_support.geometry import pose_matrix
 
 MAX_BINS = 4096  # Four times what scanning sonars send (Micron 800, Imagenex 852 500); more is a broken message
 
@@ -70,6 +71,12 @@ class PlacedBeam:
     beam: Beam
     T_target_sonar: np.ndarray
     is_moving: bool
+
+    def turned(self, angle: float) -> "PlacedBeam":
+        """Return the beam of a sonar that is turned by `angle` [rad] more about the target frame's z, where it is."""
+        T_turned = self.T_target_sonar.copy()
+        T_turned[:3, :3] = pose_matrix((0.0, 0.0, 0.0), (0.0, 0.0, angle))[:3, :3] @ self.T_target_sonar[:3, :3]
+        return replace(self, T_target_sonar=T_turned)
 
     @property
     def signed_stamp(self) -> float:

@@ -115,6 +115,8 @@ class SonarToCloud:
     def _place(self, placed: PlacedBeam) -> None:
         parameters = self._live.current
         with self.health.timed():
+            if parameters.sonar_turned:
+                placed = placed.turned(parameters.sonar_turned)
             if self._newest_beam.is_read:
                 self._newest_beam.publish(self._assembler.project(placed))
             scan = self._assembler.add(placed)

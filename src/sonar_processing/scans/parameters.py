@@ -1,5 +1,6 @@
 """Parameters of sonar_to_cloud (thesis 6.5.2)."""
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -98,3 +99,8 @@ class SonarToCloudParameters(
     MountingParameters, BeamMessageParameters, BeamCorrection, ScanParameters, StampParameters
 ):
     """Parameters of sonar_to_cloud."""
+
+    sonar_turned: float = parameter(
+        0.0, "how far the sonar is turned against tf, counter-clockwise seen from above, as mlsm_core names it",
+        unit="rad", low=-2.0 * math.pi, high=2.0 * math.pi,
+    )  # fmt: skip

@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -12,7 +13,7 @@ from hypothesis import strategies as st
 from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
-from sonar_processing.beams.beam import Beam, project_beams
+from sonar_processing.beams.beam import Beam, PlacedBeam, beam_directions, project_beams
 from sonar_processing.beams.parameters import BeamCorrection, MountingParameters
 from sonar_processing.cloud import Cloud
 
@@ -24,6 +25,15 @@ BEAM = Beam(5_000_000_001, "sonar", 0.1, np.arange(4, dtype=np.uint8), 0.5)
 def _beam(bins=3, **values):
     defaults = {"stamp_ns": 1, "frame_id": "sonar", "angle": 0.0, "range_resolution": 0.1}
     return Beam(intensities=np.zeros(bins, dtype=np.uint8), **{**defaults, **values})
+
+
+@given(ANGLES, ANGLES, ANGLES)
+def test_a_level_sonar_that_is_turned_hears_where_its_head_would_point_otherwise(angle, yaw, turn):
+    placed = PlacedBeam(replace(BEAM, angle=angle), pose_matrix((1.0, 2.0, 3.0), (0.0, 0.0, yaw)), False)
+    turned = placed.turned(turn).T_target_sonar
+    expected = beam_directions(np.array(angle + turn), placed.T_target_sonar)
+    np.testing.assert_allclose(beam_directions(np.array(angle), turned), expected, atol=1e-9)
+    np.testing.assert_array_equal(turned[:, 3], placed.T_target_sonar[:, 3])
 
 
 @pytest.mark.parametrize("bins", [0, 4097, 10000])
