@@ -17,7 +17,7 @@ from mlsm_manager.offline.replay import Replayed, ReplayParameters
 from mlsm_manager.offline.trust import KnownPlaces, Trust, radii
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.scan_matching.scan_path import POSITION
-from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, Assumption, Cause, ranked, widened
+from mlsm_manager.self_check.causes import CERTAIN, NOTHING_ASSUMED, UNTOLD_ALONE, Assumption, Cause, ranked, widened
 from mlsm_manager.self_check.map_checks import in_submaps, recent_agreement, scans_go_on, surfaces_tell
 from mlsm_manager.self_check.path_checks import (
     LARGEST_DEVIATION,
@@ -33,7 +33,6 @@ from node_support.parameters import describe
 from sonar_processing.beams.parameters import BeamCorrection
 
 _FEWEST_SCANS = 20  # a window's worth: fewer say too little of scale and delay
-_UNTOLD_ALONE = "with a compass alone nothing tells whether all headings or all ranges are off alike"
 _OF_RUN = ("range_scale_error", "sonar_delay")  # as the solver's unknowns of the run are ordered
 
 
@@ -220,7 +219,7 @@ def _trust(
     ways = max((best.places, reported), key=lambda path: float(np.ptp(path, axis=0).max()))
     covariances = widened(best.covariances, best.times, ways, causes)
     is_alone = np.isinf(replayed.solver.odometry.distance_deviation) and np.ptp(replayed.odometry[:, 2]) > 0.0
-    untold = _UNTOLD_ALONE if is_alone else ""
+    untold = UNTOLD_ALONE if is_alone else ""
     return Trust(verdicts, best.times, covariances, replayed.matched, causes, untold=untold).assuming(assumed, ways)
 
 

@@ -90,6 +90,7 @@ class Assumption(NamedTuple):
 
 
 NOTHING_ASSUMED = Assumption("")
+UNTOLD_ALONE = "with a compass alone nothing tells whether all headings or all ranges are off alike"
 
 
 def ranked(causes: Iterable[Cause]) -> List[Cause]:

@@ -16,6 +16,7 @@ from mlsm_manager.scan_matching.scan import Scan, Track, joined
 from mlsm_manager.self_check.beam_causes import head_causes
 from mlsm_manager.self_check.causes import (
     NOTHING_ASSUMED,
+    UNTOLD_ALONE,
     Assumption,
     Cause,
     Fault,
@@ -36,6 +37,7 @@ from mlsm_manager.self_check.standing_head import HeadStood, head_stood, of_stan
 from node_support.geometry import composed, move_of
 from sonar_processing.beams.beam import Beam
 
+_NOT_LOOKED = "not looked at yet"
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
 _AT_ONCE = 10.0
@@ -66,13 +68,17 @@ class _Newest(NamedTuple):
 
 
 class _Found(NamedTuple):
-    """What one look finds; see MotionFindings. spread: (2, 2) m^2, what other paths add to the newest place."""
+    """What one look finds; see MotionFindings. spread: (2, 2) m^2, what other paths add to the newest place.
+
+    rests_on: what nobody measured, in words.
+    """
 
     causes: List[Cause]
     course: CourseFound
     assumed: Assumption
     spread: np.ndarray = np.zeros((2, 2))
     by_mounts: float = 0.0
+    rests_on: str = _NOT_LOOKED
 
 
 class LiveCauses:
@@ -95,6 +101,8 @@ class LiveCauses:
             self._shown: List[Cause] = []
             self._spread, self.by_mounts = np.zeros((2, 2)), 0.0
             self._course, self._assumed = NOT_TOLD, NOTHING_ASSUMED
+            self.assumed = _NOT_LOOKED
+            """What the path rests on though nobody measured it, in words."""
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
@@ -146,7 +154,9 @@ class LiveCauses:
             motion = _motion_of(run, suspected, newest, self._course)
             spread = motion.spread(run.log.node_times[-1:])[0]
             causes = motion.told_with(of_echoes, of_beams)
-            found = _Found(causes, motion.course, motion.assumed, spread, motion.by_mounts)
+            untold = UNTOLD_ALONE if motion.is_alone and motion.is_told else "nothing"
+            rests_on = motion.assumed.text or untold
+            found = _Found(causes, motion.course, motion.assumed, spread, motion.by_mounts, rests_on)
         stuck = [of_stuck(*one) for one in stuck_headings(newest.track)]
         with self._lock:
             if self._places is newest.places:
@@ -177,6 +187,7 @@ class LiveCauses:
         A weak cause is named after two looks in a row have found it.
         """
         self._course, self._assumed = found.course, found.assumed
+        self.assumed = found.rests_on
         self._shown, before = found.causes, self._shown
         named = [one for one in self._shown if one.evidence > _AT_ONCE or any(is_alike(one, other) for other in before)]
         kinds = {cause.fault.kind for cause in named if cause.fault is not None}
@@ -184,11 +195,6 @@ class LiveCauses:
         self._found = [*named, *(cause for cause in past if cause.fault.kind not in kinds)]
         if not self._found or np.trace(found.spread) > np.trace(self._spread):
             self._spread, self.by_mounts = found.spread, found.by_mounts
-
-    @property
-    def assumed(self) -> str:
-        """What the path rests on though nobody measured it; empty where it rests on nothing such."""
-        return self._assumed.text
 
     def causes(self, steps: Sequence[Step]) -> List[Cause]:
         """Return what is wrong, ranked; steps: of the odometry, which were left out."""

@@ -16,6 +16,7 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault, likely_faults
 from mlsm_manager.odometry.steps import MotionLimits, Step, StepKind
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan import Track
+from mlsm_manager.self_check.causes import UNTOLD_ALONE
 from mlsm_manager.self_check.echo_causes import echo_findings
 from node_support.geometry import move_of
 
@@ -287,7 +288,19 @@ def test_where_ranges_contradict_a_dvl_the_position_is_less_known_and_that_is_to
         added.append(np.trace(localiser.following.found.covariance([])))
         assumed.append(localiser.following.found.assumed[:35])
     assert added[0] < 0.1 < added[1]  # m^2
-    assert assumed == ["", "the odometry's distances are right,"]
+    assert assumed == ["nothing", "the odometry's distances are right,"]
+
+
+@pytest.mark.long
+def test_what_a_compass_alone_does_not_tell_is_said_while_the_run_goes_on():
+    recording = source("harbour compass", 150.0)
+    parameters = ReplayParameters().changed(profile_values(OdometryKind.HEADING))
+    localiser = parameters.build_localiser(recording.sonar_in_base)
+    assert localiser.following.found.assumed == "not looked at yet"
+    for scan in scans_in(recording, parameters.echoes()):
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+    assert localiser.following.found.assumed == UNTOLD_ALONE
 
 
 @pytest.mark.long
