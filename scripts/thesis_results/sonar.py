@@ -110,7 +110,8 @@ def _simulated_turn(world: World, place: tuple, model_name: str, reach: float) -
 def _turn_of_852(world: World, settings: HeadSettings) -> Turn:
     """Return what an emulated 852 replies during a turn, as a driver reads it."""
     place = pose_matrix(_PLACE_852)
-    head, parser, command = Emulated852(WorldEchoes(world, lambda: place, 1)), ReplyParser(), settings.command()
+    head = Emulated852(echo_source=WorldEchoes(world, lambda: place, 1))
+    parser, command = ReplyParser(), settings.command()
     sent = (head.receive(command.encode(), float(second)) for second in range(_BEAMS))
     replies = [found.reply for pieces in sent for piece in pieces for found in parser.feed(piece.data)]
     strengths = np.array([np.frombuffer(reply.echoes, np.uint8) for reply in replies])

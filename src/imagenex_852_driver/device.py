@@ -1,12 +1,13 @@
 """The head on its serial line: sends one command, returns its reply, and counts everything else."""
 
 from dataclasses import dataclass
-from typing import Any, Iterator, List, Optional
+from typing import Any, List, Optional
 
 from imagenex_852_driver.command import SwitchCommand
-from imagenex_852_driver.parameters import ConnectionParameters
+from imagenex_852_driver.parameters import ConnectionParameters, ping_leaves, reply_begins
 from imagenex_852_driver.reply import ParsedReply, Reply, ReplyKind, ReplyParser
 from sonar_driver.device import LineDevice, LineStats
+from sonar_driver.port import transmission_time
 
 _SURELY_TOO_EARLY = 0.9  # share of the expected time: too early for any realistic speed of sound
 _QUIET = 0.02  # s: a busy line counts as quiet after that; USB adapters pass bytes on in pieces up to 16 ms apart
@@ -46,8 +47,8 @@ class ReplyWait:
     """
 
     def __init__(self, command: SwitchCommand, connection: ConnectionParameters, start: float) -> None:
-        timing = connection.timing()
-        leaves, begins = timing.ping_leaves(), timing.reply_begins(command)
+        leaves, begins = ping_leaves(connection), reply_begins(connection, command)
+        ends = begins + transmission_time(command.reply_kind.length, connection.baud_rate)
         self.command = command
         self.reply: Optional[Reply] = None
         self.early_replies = 0
@@ -57,7 +58,7 @@ class ReplyWait:
         self._length = command.reply_kind.length
         self._byte_gap = connection.byte_gap
         self._deadline = start + self.patience
-        self._last_deadline = start + timing.reply_ends(command) + connection.reply_margin + connection.byte_gap
+        self._last_deadline = start + ends + connection.reply_margin + connection.byte_gap
         self._last_byte = float("inf")
         self._early_bytes = 0
         self._early_reply_bytes = 0
@@ -67,10 +68,6 @@ class ReplyWait:
     def answer_bytes(self) -> int:
         """Number of received bytes that do not belong to the reply to an earlier command."""
         return max(0, self._received - max(self._early_bytes, self._early_reply_bytes))
-
-    @property
-    def answered(self) -> bool:
-        return self.answer_bytes > 0
 
     @property
     def missing_bytes(self) -> int:
@@ -84,16 +81,23 @@ class ReplyWait:
             self._early_bytes = self._received
         elif data:
             self._last_byte = now
-        self._sort(replies)
+        for offset, reply in replies:
+            if offset < self._early_bytes:
+                self.early_replies += 1
+                self._early_reply_bytes = max(self._early_reply_bytes, offset + reply.kind.length)
+            else:
+                # Two replies at once were read after a stall; the earlier one is an old reply that the head sent twice.
+                self.unexpected_replies += int(self.reply is not None)
+                self.reply = reply
 
     def expired(self, now: float) -> bool:
-        return not self.answered and now >= self._deadline
+        return not self.answer_bytes and now >= self._deadline
 
     def over(self, now: float, pending: bool) -> bool:
         """Return whether waiting any longer is useless; `pending`: whether a reply may have begun."""
         if self.reply is not None or self.expired(now):
             return True
-        if not self.answered:
+        if not self.answer_bytes:
             return False
         complete = self.missing_bytes == 0 and not pending
         return complete or now - self._last_byte >= self._byte_gap or now >= self._last_deadline
@@ -109,16 +113,6 @@ class ReplyWait:
             if should != is_
         ]
         return f"bad reply: {', '.join(wrong)}" if wrong else ""
-
-    def _sort(self, replies: List[ParsedReply]) -> None:
-        for offset, reply in replies:
-            if offset < self._early_bytes:
-                self.early_replies += 1
-                self._early_reply_bytes = max(self._early_reply_bytes, offset + reply.kind.length)
-            else:
-                # Two replies at once were read after a stall; the earlier one is an old reply that the head sent twice.
-                self.unexpected_replies += int(self.reply is not None)
-                self.reply = reply
 
 
 @dataclass(frozen=True)
@@ -137,12 +131,11 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
 
     def __init__(self, connection: ConnectionParameters, *arguments: Any, **options: Any) -> None:
         super().__init__(connection, *arguments, **options)
-        self._timing = connection.timing()
         self._parser = ReplyParser()
 
     def _ping(self, command: SwitchCommand) -> Optional[Ping]:
         self._drain()
-        stamp = self._clock() + self._timing.ping_leaves()
+        stamp = self._clock() + ping_leaves(self.connection)
         wait = ReplyWait(command, self.connection, self.elapsed())
         self._count("pings")
         try:
@@ -168,7 +161,7 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
 
     def _bytes_to_read(self, wait: ReplyWait, now: float) -> int:
         """Return how many bytes to wait for: first a single one, to notice in time whether it arrived too early."""
-        if wait.answered:
+        if wait.answer_bytes:
             return max(1, wait.missing_bytes)
         return self._port.in_waiting if wait.expired(now) else max(1, self._port.in_waiting)
 
@@ -177,7 +170,7 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
             return self._accept(wait, stamp)
         if self.stop.is_set():
             self._count("interrupted")
-        elif wait.answered:
+        elif wait.answer_bytes:
             self._count("bad_frames", f"bad reply: {wait.answer_bytes} bytes, no whole reply")
         else:
             self._count("timeouts", f"no reply within {wait.patience:.2f} s")
@@ -199,7 +192,7 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
 
     def _await_late_reply(self) -> None:
         deadline = self.elapsed() + self.connection.late_window
-        limit = deadline + self._timing.transmission(ReplyKind.IGX.length)
+        limit = deadline + transmission_time(ReplyKind.IGX.length, self.connection.baud_rate)
         while not self.stop.is_set():
             now = self.elapsed()
             if now >= limit or (now >= deadline and not self._parser.pending):
@@ -210,8 +203,8 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
     def _drain(self) -> None:
         """Empty the line before a command; wait until a head that is still sending has finished."""
         deadline = self.elapsed() + _LONGEST_DRAIN
-        for data in self._waiting():
-            self._unexpected(data)
+        while self._port.in_waiting and not self.stop.is_set():
+            self._unexpected(self._port.read(self._port.in_waiting))
             if self.elapsed() < deadline:
                 self.stop.wait(_QUIET)
         self._parser.reset()
@@ -221,7 +214,3 @@ class SonarDevice(LineDevice[SwitchCommand, Ping]):
         if found:
             self._count("unexpected_replies", _UNEXPECTED, found)
         return found
-
-    def _waiting(self) -> Iterator[bytes]:
-        while self._port.in_waiting and not self.stop.is_set():
-            yield self._port.read(self._port.in_waiting)

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import List, Optional
 
 from imagenex_852_driver.command import CommandReader, SwitchCommand
-from imagenex_852_driver.parameters import LineTiming
+from imagenex_852_driver.parameters import ping_leaves, reply_begins
 from imagenex_852_driver.reply import (
     AHEAD,
     HEAD_IDS,
@@ -22,7 +22,6 @@ from sonar_driver.emulated_head import (
     EmulatedHeadParameters,
     Fault,
     FaultInjector,
-    FixedPattern,
     PingRequest,
     Transmission,
 )
@@ -60,29 +59,22 @@ class HeadRotation:
             self.clockwise = not self.clockwise
 
     def step(self, command: SwitchCommand) -> None:
-        width = _positions(command.sector_width_deg)
+        width, size = _positions(command.sector_width_deg), _positions(command.step_size_deg)
         low = AHEAD + _positions(command.train_angle_deg) - width // 2
-        size = _positions(command.step_size_deg)
+        high = low + width
         if not size:
             return
-        if not low <= self.position <= low + width:
-            self._approach(low, low + width, size)
+        if not low <= self.position <= high:
+            self.clockwise = self.position < low
+            goal = low if self.clockwise else high
         elif width == _TURN:
             self.position = low + (self.position - low + (size if self.clockwise else -size)) % _TURN
+            return
         else:
-            self._go_to_and_fro(low, low + width, size)
-
-    def _approach(self, low: int, high: int, size: int) -> None:
-        self.clockwise = self.position < low
-        self._go_to(low if self.clockwise else high, size)
-
-    def _go_to_and_fro(self, low: int, high: int, size: int) -> None:
-        if self.position == (high if self.clockwise else low):
-            self.clockwise = not self.clockwise
-        self._go_to(high if self.clockwise else low, size)
-
-    def _go_to(self, target: int, size: int) -> None:
-        distance = min(size, abs(target - self.position))
+            if self.position == (high if self.clockwise else low):
+                self.clockwise = not self.clockwise
+            goal = high if self.clockwise else low
+        distance = min(size, abs(goal - self.position))
         self.position += distance if self.clockwise else -distance
 
 
@@ -99,15 +91,11 @@ class Emulated852(EmulatedHead):
 
     def __init__(
         self,
+        parameters: Optional[EmulatorParameters] = None,
         echo_source: Optional[EchoSource] = None,
         faults: Optional[FaultInjector] = None,
-        timing: Optional[LineTiming] = None,
-        head_id: int = SONAR_HEAD_ID,
     ) -> None:
-        self._timing = timing or LineTiming()
-        super().__init__(faults or FaultInjector(EmulatorParameters()), self._timing.baud_rate)
-        self._echo_source = echo_source or FixedPattern()
-        self._head_id = head_id
+        super().__init__(parameters or EmulatorParameters(), echo_source, faults)
         self.reboot()
 
     def reboot(self) -> None:
@@ -118,19 +106,17 @@ class Emulated852(EmulatedHead):
     def receive(self, data: bytes, time: float) -> List[Transmission]:
         answers = []
         for command in self._reader.feed(data):
-            if command.head_id == self._head_id:
+            if command.head_id == self._parameters.head_id and time >= self._silent_until:
                 answers.extend(self._answer(command, time))
         return answers
 
     def _answer(self, command: SwitchCommand, time: float) -> List[Transmission]:
-        if time < self._silent_until:
-            return []
         fault = self.faults.next()
         if self._struck_dumb(fault, time):
             return []
         frame = self._ping(command, time, overrun=fault is Fault.OVERRUN).encode()
         # A command is complete when its last byte has arrived.
-        begin = time + self._timing.reply_begins(command) - self._timing.ping_leaves()
+        begin = time + reply_begins(self._parameters, command) - ping_leaves(self._parameters)
         return self._transmissions(fault, frame, begin)
 
     def _garbled(self, frame: bytes) -> bytes:
@@ -146,11 +132,11 @@ class Emulated852(EmulatedHead):
         if kind.echo_count:
             gain_db = command.start_gain_db - _FULL_STRENGTH_DB
             ping = PingRequest(time, head_angle(position), kind.echo_count, command.max_range, gain_db)
-            echoes = self._echo_source.echoes(ping)
+            echoes = self._echoes(ping)
         self._motion.step(command)
         return Reply(
             kind=kind,
-            head_id=self._head_id,
+            head_id=self._parameters.head_id,
             status=_SONAR_STATUS | SWITCHES_ACCEPTED | (OVERRUN if overrun else 0),
             head_position=position,
             clockwise=self._motion.clockwise,

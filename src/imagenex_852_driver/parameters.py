@@ -2,11 +2,13 @@
 
 from dataclasses import dataclass, fields
 from enum import Enum
+from typing import Union
 
 from imagenex_852_driver.command import LENGTH as COMMAND_LENGTH
 from imagenex_852_driver.command import SwitchCommand
 from imagenex_852_driver.reply import HEAD_IDS, SONAR_HEAD_ID, FrameError
 from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_driver.emulated_head import EmulatedHeadParameters
 from sonar_driver.port import LineParameters, MountingParameters, transmission_time
 
 MECHANICAL_LIMIT_DEG = 210  # the head's mechanical stops, to either side of straight ahead
@@ -58,7 +60,16 @@ class HeadSettings(ParameterSet):
     def check(self) -> None:
         super().check()
         self.command()
-        self._check_sector()
+        reach = abs(self.train_angle_deg) + self.sector_width_deg / 2
+        if reach > MECHANICAL_LIMIT_DEG:
+            raise ParameterError(
+                f"train_angle_deg = {self.train_angle_deg} with sector_width_deg = {self.sector_width_deg}: "
+                f"the sector would end at {reach:g} deg, the head stops at {MECHANICAL_LIMIT_DEG} deg"
+            )
+        if 0 < self.sector_width_deg < self.step_size_deg:
+            raise ParameterError(
+                f"sector_width_deg = {self.sector_width_deg}: narrower than step_size_deg = {self.step_size_deg}"
+            )
 
     def command(self) -> SwitchCommand:
         same = {one.name: getattr(self, one.name) for one in fields(SwitchCommand) if hasattr(self, one.name)}
@@ -71,18 +82,6 @@ class HeadSettings(ParameterSet):
         except FrameError as error:
             raise ParameterError(self._terminator_complaint() or str(error)) from error
 
-    def _check_sector(self) -> None:
-        reach = abs(self.train_angle_deg) + self.sector_width_deg / 2
-        if reach > MECHANICAL_LIMIT_DEG:
-            raise ParameterError(
-                f"train_angle_deg = {self.train_angle_deg} with sector_width_deg = {self.sector_width_deg}: "
-                f"the sector would end at {reach:g} deg, the head stops at {MECHANICAL_LIMIT_DEG} deg"
-            )
-        if 0 < self.sector_width_deg < self.step_size_deg:
-            raise ParameterError(
-                f"sector_width_deg = {self.sector_width_deg}: narrower than step_size_deg = {self.step_size_deg}"
-            )
-
     def _terminator_complaint(self) -> str:
         suspects = {"pulse_length_us": 253, "switch_delay_ms": 506}
         names = [name for name, value in suspects.items() if getattr(self, name) == value]
@@ -93,30 +92,6 @@ class HeadSettings(ParameterSet):
 
 
 @dataclass(frozen=True)
-class LineTiming:
-    """Baud rate (8N1) and speed of sound; all results are seconds after the command's first bit."""
-
-    baud_rate: int = 115200
-    speed_of_sound: float = 1500.0
-
-    def transmission(self, byte_count: int) -> float:
-        return transmission_time(byte_count, self.baud_rate)
-
-    def ping_leaves(self) -> float:
-        """Return when the head transmits: it acts on the last byte of the command."""
-        return self.transmission(COMMAND_LENGTH)
-
-    def reply_begins(self, command: SwitchCommand) -> float:
-        """Return when the reply can leave the head at the earliest: after the farthest echo and the switch delay."""
-        travel = 2 * command.max_range / self.speed_of_sound
-        return self.ping_leaves() + travel + command.switch_delay_ms / 1000
-
-    def reply_ends(self, command: SwitchCommand) -> float:
-        """Return when the last byte of the reply can have arrived at the earliest."""
-        return self.reply_begins(command) + self.transmission(command.reply_kind.length)
-
-
-@dataclass(frozen=True)
 class ConnectionParameters(LineParameters):
     """Where the head is connected, and how long its replies take."""
 
@@ -124,8 +99,23 @@ class ConnectionParameters(LineParameters):
         1500.0, "speed of sound, as the head has it", unit="m/s", low=1000.0, tunable=False
     )
 
-    def timing(self) -> LineTiming:
-        return LineTiming(self.baud_rate, self.speed_of_sound)
+
+Line = Union[ConnectionParameters, EmulatedHeadParameters]
+"""Either end of the line; both have a baud rate (8N1) and a speed of sound."""
+
+
+def ping_leaves(line: Line) -> float:
+    """Return when the head transmits, in s after the command's first bit: it acts on the last byte of the command."""
+    return transmission_time(COMMAND_LENGTH, line.baud_rate)
+
+
+def reply_begins(line: Line, command: SwitchCommand) -> float:
+    """Return when the reply can leave the head at the earliest, in s after the command's first bit.
+
+    That is after the farthest echo and the switch delay.
+    """
+    travel = 2 * command.max_range / line.speed_of_sound
+    return ping_leaves(line) + travel + command.switch_delay_ms / 1000
 
 
 @dataclass(frozen=True)

@@ -97,15 +97,14 @@ class Reply:
         return self.max_range / len(self.echoes) if self.echoes else 0.0
 
     def encode(self) -> bytes:
-        position_high = (self.head_position >> 8) << 1 | (self.head_position >> 7) & 1
-        direction = _CLOCKWISE_BIT if self.clockwise else 0
+        position_low, position_high = _packed(self.head_position)
         header = bytes(
             [
                 *self.kind.value,
                 self.head_id,
                 self.status,
-                self.head_position & 0x7F,
-                direction | position_high,
+                position_low,
+                position_high | (_CLOCKWISE_BIT if self.clockwise else 0),
                 self.max_range,
                 *_packed(self.profile_range_cm),
                 *_packed(len(self.echoes)),
@@ -119,13 +118,12 @@ class Reply:
         kind = check_header(frame)
         require("length of the reply", len(frame), (kind.length,))
         require("terminator of the reply", frame[-1], (TERMINATOR,))
-        low, high = frame[5], frame[6]
         return cls(
             kind=kind,
             head_id=frame[3],
             status=frame[4],
-            head_position=(high & 0x3E) >> 1 << 8 | (high & 1) << 7 | low & 0x7F,
-            clockwise=bool(high & _CLOCKWISE_BIT),
+            head_position=_unpacked(frame[5], frame[6] & ~_CLOCKWISE_BIT),
+            clockwise=bool(frame[6] & _CLOCKWISE_BIT),
             max_range=frame[7],
             profile_range_cm=_unpacked(frame[8], frame[9]),
             echoes=bytes(frame[HEADER_LENGTH:-1]),
@@ -164,11 +162,11 @@ def check_header(data: bytes) -> ReplyKind:
 
 def _packed(value: int) -> bytes:
     """Split 14 bits into two bytes of which the low one has 7 bits, so that bit 7 is never set."""
-    return bytes([value & 0x7F, (value >> 8) << 1 | (value >> 7) & 1])
+    return bytes([value & 0x7F, value >> 7])
 
 
 def _unpacked(low: int, high: int) -> int:
-    return (high & 0x7E) >> 1 << 8 | (high & 1) << 7 | low & 0x7F
+    return (high & 0x7F) << 7 | low & 0x7F
 
 
 _LETTERS = re.compile(b"I[MGP]X")
@@ -204,8 +202,8 @@ class ReplyParser:
         self._buffer += data
         found = []
         while self._skip_to_letters():
-            kind = self._announced()
-            if kind is None:
+            kind = ReplyKind(bytes(self._buffer[:3]))
+            if len(self._buffer) >= HEADER_LENGTH and not _is_header(self._buffer):
                 self._skip(1)
                 continue
             inner = self._inner_header(kind.length)
@@ -214,7 +212,11 @@ class ReplyParser:
             elif len(self._buffer) < kind.length:
                 break
             else:
-                found.extend(self._take(kind))
+                try:
+                    found.append(ParsedReply(self._offset, Reply.decode(bytes(self._buffer[: kind.length]))))
+                    self._skip(kind.length)
+                except FrameError:
+                    self._skip(1)
         return found
 
     def reset(self) -> None:
@@ -222,35 +224,16 @@ class ReplyParser:
         self._buffer.clear()
         self._offset = 0
 
-    def _announced(self) -> Optional[ReplyKind]:
-        """Return the kind of the reply at the front, None when its header is corrupt."""
-        if len(self._buffer) >= HEADER_LENGTH and not _is_header(self._buffer):
-            return None
-        return ReplyKind(bytes(self._buffer[:3]))
-
-    def _take(self, kind: ReplyKind) -> List[ParsedReply]:
-        try:
-            parsed = ParsedReply(self._offset, Reply.decode(bytes(self._buffer[: kind.length])))
-        except FrameError:
-            self._skip(1)
-            return []
-        self._skip(kind.length)
-        return [parsed]
-
     def _inner_header(self, length: int) -> Optional[int]:
         """Return where another reply begins inside the one at the front, whose own end was then lost."""
+        is_complete = len(self._buffer) >= length
         for match in _LETTERS.finditer(self._buffer, 1, length):
             header = self._buffer[match.start() : min(match.start() + HEADER_LENGTH, length)]
-            if _is_header(header) or self._is_cut_header(header, length):
+            # The next reply may go on after the last byte of a complete one: its status can look like the terminator.
+            is_cut = is_complete and _STATUS < len(header) < HEADER_LENGTH and header[3] in HEAD_IDS
+            if is_cut or _is_header(header):
                 return match.start()
         return None
-
-    def _is_cut_header(self, header: bytes, length: int) -> bool:
-        """Return whether the last bytes of a complete reply look like a header that continues after it.
-
-        The status byte of the next reply can look like the terminator of this one.
-        """
-        return len(self._buffer) >= length and _STATUS < len(header) < HEADER_LENGTH and header[3] in HEAD_IDS
 
     def _skip_to_letters(self) -> bool:
         match = _LETTERS.search(self._buffer)

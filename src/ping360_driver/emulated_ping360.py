@@ -29,7 +29,6 @@ from sonar_driver.emulated_head import (
     EmulatedHeadParameters,
     Fault,
     FaultInjector,
-    FixedPattern,
     PingRequest,
     Transmission,
 )
@@ -82,16 +81,13 @@ class SectorScan:
         """Go to the angle of the next ping; return by how many gradians the head turns."""
         position = (self.angle - self._start) % TURN
         following = position + (self._step if self._clockwise else -self._step)
-        if not 0 <= following <= self._width:
-            following = self._beyond_the_edge(position)
+        if not 0 <= following <= self._width and self._width > _HALF_TURN:
+            following = 0
+        elif not 0 <= following <= self._width:
+            self._clockwise = not self._clockwise
+            following = min(max(position + (self._step if self._clockwise else -self._step), 0), self._width)
         self.angle = (self._start + following) % TURN
         return min((following - position) % TURN, (position - following) % TURN)
-
-    def _beyond_the_edge(self, position: int) -> int:
-        if self._width > _HALF_TURN:
-            return 0
-        self._clockwise = not self._clockwise
-        return min(max(position + (self._step if self._clockwise else -self._step), 0), self._width)
 
 
 class EmulatedPing360(EmulatedHead):
@@ -99,16 +95,11 @@ class EmulatedPing360(EmulatedHead):
 
     def __init__(
         self,
+        parameters: Optional[EmulatorParameters] = None,
         echo_source: Optional[EchoSource] = None,
         faults: Optional[FaultInjector] = None,
-        baud_rate: float = 115200,
-        speed_of_sound: float = 1500.0,
-        auto_transmit: bool = True,
     ) -> None:
-        super().__init__(faults or FaultInjector(EmulatorParameters()), baud_rate)
-        self._echo_source = echo_source or FixedPattern()
-        self._speed_of_sound = speed_of_sound
-        self._auto_transmit = auto_transmit
+        super().__init__(parameters or EmulatorParameters(), echo_source, faults)
         self._angle = AHEAD
         self._stream = MessageStream()
         self._scan: Optional[SectorScan] = None
@@ -147,7 +138,9 @@ class EmulatedPing360(EmulatedHead):
             return self._at_once(packed_nack(message.message_id, wrong), time)
         self._rest()
         if message.message_id == MessageId.TRANSDUCER:
-            return self._point_and_ping(message, time)
+            ping_time = time + self._turning_time_to(message.angle)
+            self._angle = message.angle
+            return self._ping(message, ping_time, MessageId.DEVICE_DATA)
         self._command, self._scan = message, SectorScan(message.start_angle, message.stop_angle, message.num_steps)
         self.next_event = time + self._turning_time_to(message.start_angle)
         return []
@@ -156,24 +149,19 @@ class EmulatedPing360(EmulatedHead):
         if requested_id != MessageId.DEVICE_INFORMATION:
             return self._at_once(packed_nack(MessageId.GENERAL_REQUEST, "not known to the emulated head"), time)
         names = ("firmware_version_major", "firmware_version_minor", "firmware_version_patch")
-        firmware = dict(zip(names, _FIRMWARES[self._auto_transmit]))
+        firmware = dict(zip(names, _FIRMWARES[self._parameters.auto_transmit]))
         return self._at_once(packed(MessageId.DEVICE_INFORMATION, device_type=_PING360, **firmware), time)
 
     def _at_once(self, frame: bytes, time: float) -> List[Transmission]:
         return self._paced(frame, time + _ANSWER_TIME)
 
     def _complaint(self, message: PingMessage) -> str:
-        if message.message_id == MessageId.AUTO_TRANSMIT and not self._auto_transmit:
+        if message.message_id == MessageId.AUTO_TRANSMIT and not self._parameters.auto_transmit:
             return "not known to this firmware"
         for name in message.payload_field_names:
             if getattr(message, name) not in _ALLOWED.get(name, range(0x10000)):
                 return f"{name} out of range"
         return ""
-
-    def _point_and_ping(self, message: PingMessage, time: float) -> List[Transmission]:
-        ping_time = time + self._turning_time_to(message.angle)
-        self._angle = message.angle
-        return self._ping(message, ping_time, MessageId.DEVICE_DATA)
 
     def _turning_time_to(self, angle: int) -> float:
         turn = (angle - self._angle) % TURN
@@ -192,10 +180,10 @@ class EmulatedPing360(EmulatedHead):
 
     def _beam(self, command: PingMessage, time: float, message_id: MessageId) -> bytes:
         pulse = _pulse(command)
-        reach = pulse.number_of_samples * bin_length(pulse.sample_period, self._speed_of_sound)
+        reach = pulse.number_of_samples * bin_length(pulse.sample_period, self._parameters.speed_of_sound)
         gain_db = _GAINS_DB[pulse.gain_setting]
         ping = PingRequest(time, head_angle(self._angle), pulse.number_of_samples, reach, gain_db)
-        echoes = self._echo_source.echoes(ping)
+        echoes = self._echoes(ping)
         told = {name: getattr(command, name) for name in command.payload_field_names}
         return packed(
             message_id,

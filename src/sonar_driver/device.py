@@ -31,11 +31,6 @@ class LineStats:
     connections: int = 0
     last_error: str = ""
 
-    @property
-    def losses(self) -> int:
-        """How often a port that had been open was lost."""
-        return max(0, self.connections - int(self.connected))
-
     problems: ClassVar[Mapping[str, str]] = {}
     """What to check when a count that should stay zero does not, by the name of its field with spaces."""
 
@@ -77,7 +72,8 @@ class DriverHealth(Health):
             self.show(name, value)
         for kind, hint in stats.problems.items():
             self._note_problem(kind, hint, getattr(stats, kind.replace(" ", "_")))
-        self._note_problem("losses of the port", stats.last_error, stats.losses)
+        losses = max(0, stats.connections - int(stats.connected))
+        self._note_problem("losses of the port", stats.last_error, losses)
 
     def _note_problem(self, kind: str, detail: str, total: int) -> None:
         seen = self._seen.get(kind, 0)

@@ -11,10 +11,9 @@ from collections import deque
 from typing import Deque, Optional, Tuple, Union
 
 from sonar_driver.emulated_head import EmulatedHead, Transmission
+from sonar_driver.port import LONGEST_DATAGRAM
 
-_WAKE_SIZE = 4096  # Bytes: more than are ever written to wake the server
-_READ_SIZE = 4096  # Bytes: many commands; a read takes what is there
-_LONGEST_DATAGRAM = 65535  # Bytes
+_READ_SIZE = 4096  # Bytes: more than commands, or what wakes the server, ever take; a read takes what is there
 
 
 class PtyLine:
@@ -89,7 +88,7 @@ class UdpLine:
 
     def read(self) -> bytes:
         with contextlib.suppress(BlockingIOError, ConnectionError):
-            data, self._peer = self._socket.recvfrom(_LONGEST_DATAGRAM)
+            data, self._peer = self._socket.recvfrom(LONGEST_DATAGRAM)
             return data
         return b""
 
@@ -105,10 +104,9 @@ ServedLine = Union[PtyLine, UdpLine]
 
 
 class HeadServer:
-    """Makes a head answer on a line.
+    """Makes a head answer on a line: a context manager, which serves from a thread of its own.
 
-    Use it as a context manager, which serves from a new thread, or call `serve` from your own thread. While the line
-    has disappeared, whoever has it open sees it hang up.
+    While the line has disappeared, whoever has it open sees it hang up.
     """
 
     def __init__(self, head: EmulatedHead, line: ServedLine) -> None:
@@ -118,58 +116,46 @@ class HeadServer:
         self._outgoing: Deque[Transmission] = deque()
         self._stop = threading.Event()
         self._wake_reader, self._wake_writer = os.pipe()
-        self._thread: Optional[threading.Thread] = None
+        self._thread = threading.Thread(target=self._serve, daemon=True)
 
     def __enter__(self) -> "HeadServer":
+        """Raises OSError when the line cannot be made."""
         self._appear()
-        self._thread = threading.Thread(target=self.serve, daemon=True)
         self._thread.start()
         return self
 
     def __exit__(self, *exception: object) -> None:
-        self.stop()
-        if self._thread:
-            self._thread.join()
+        self._stop.set()
+        self._wake()
+        self._thread.join()
         os.close(self._wake_reader)
         os.close(self._wake_writer)
 
-    def serve(self) -> None:
-        """Serve until `stop` is called; raises OSError when the line cannot be made."""
+    def _serve(self) -> None:
         try:
             while not self._stop.is_set():
                 self._turn()
         finally:
             self._vanish()
 
-    def stop(self) -> None:
-        """Make `serve` return; safe from any thread and from signal handlers."""
-        self._stop.set()
-        self._wake()
-
     def _turn(self) -> None:
-        self._show_or_hide()
         now = time.monotonic()
-        if self._present:
-            if now >= self.head.next_event:
-                self._outgoing.extend(self.head.advance(now))
-            self._send_due(now)
-        sources = [self._wake_reader, self._line.fileno()] if self._present else [self._wake_reader]
-        readable = select.select(sources, [], [], self._until_next_event(now))[0]
-        if self._wake_reader in readable:
-            os.read(self._wake_reader, _WAKE_SIZE)
-        if len(readable) > int(self._wake_reader in readable):
-            self._outgoing.extend(self.head.receive(self._line.read(), time.monotonic()))
-
-    def _show_or_hide(self) -> None:
-        hidden = self.head.absent_from <= time.monotonic() < self.head.absent_until
+        hidden = self.head.absent_from <= now < self.head.absent_until
         if hidden and self._present:
             self._vanish()
         elif not hidden and not self._present:
             self._appear()
-
-    def _send_due(self, now: float) -> None:
-        while self._outgoing and self._outgoing[0].time <= now:
-            self._line.write(self._outgoing.popleft().data)
+        if self._present:
+            if now >= self.head.next_event:
+                self._outgoing.extend(self.head.advance(now))
+            while self._outgoing and self._outgoing[0].time <= now:
+                self._line.write(self._outgoing.popleft().data)
+        sources = [self._wake_reader, self._line.fileno()] if self._present else [self._wake_reader]
+        readable = select.select(sources, [], [], self._until_next_event(now))[0]
+        if self._wake_reader in readable:
+            os.read(self._wake_reader, _READ_SIZE)
+        if len(readable) > int(self._wake_reader in readable):
+            self._outgoing.extend(self.head.receive(self._line.read(), time.monotonic()))
 
     def _until_next_event(self, now: float) -> Optional[float]:
         if not self._present:

@@ -62,10 +62,9 @@ class MountingParameters(ParameterSet):
 
 
 _BITS_PER_BYTE = 10  # 8N1: one start bit, eight data bits, one stop bit
-_LONGEST_DATAGRAM = 65535  # Bytes
-# Seconds. A read returns after this time at the latest, so that a request to stop is noticed.
-READ_TIMEOUT = 0.05
-WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is lost
+LONGEST_DATAGRAM = 65535  # Bytes
+READ_TIMEOUT = 0.05  # s: a read returns after this time at the latest, so that a request to stop is noticed
+_WRITE_TIMEOUT = 0.5  # s: a command takes 3 ms; a port that blocks for longer is lost
 _REMOTE = ("socket://", "rfc2217://", "loop://")
 _USUAL_GROUP = "dialout"
 _DATAGRAMS = "udp://"
@@ -80,9 +79,8 @@ def transmission_time(byte_count: int, baud_rate: float) -> float:
 class UdpPort:
     """A port on which each message is a datagram; what arrives is a stream of bytes to the reader."""
 
-    def __init__(self, host: str, number: int, read_timeout: float) -> None:
+    def __init__(self, host: str, number: int) -> None:
         """Raises OSError. Nobody notices whether somebody listens there before something is sent."""
-        self._read_timeout = read_timeout
         self._buffer = bytearray()
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         try:
@@ -99,7 +97,7 @@ class UdpPort:
 
     def read(self, size: int = 1) -> bytes:
         """Return up to `size` bytes: once there are so many, or after the timeout those that there are."""
-        deadline = time.monotonic() + self._read_timeout
+        deadline = time.monotonic() + READ_TIMEOUT
         while len(self._buffer) < size and self._receive(deadline - time.monotonic()):
             pass
         data = bytes(self._buffer[:size])
@@ -119,7 +117,7 @@ class UdpPort:
     def _receive(self, timeout: float) -> bool:
         self._socket.settimeout(max(timeout, 0.0))
         try:
-            self._buffer += self._socket.recv(_LONGEST_DATAGRAM)
+            self._buffer += self._socket.recv(LONGEST_DATAGRAM)
         except (socket.timeout, BlockingIOError):
             return False
         return True
@@ -147,10 +145,13 @@ def open_port(name: str, baud_rate: int) -> Port:
     Raises PortUnavailableError or PortRefusedError.
     """
     if is_datagram_port(name):
-        return _open_udp_port(name)
+        try:
+            return UdpPort(*datagram_address(name))
+        except OSError as error:
+            raise PortUnavailableError(f"port {name} cannot be opened: {error.strerror or error}") from error
     local = not name.startswith(_REMOTE)
     # pyserial's remote ports refuse a write timeout.
-    options = {"exclusive": True, "write_timeout": WRITE_TIMEOUT} if local else {}
+    options = {"exclusive": True, "write_timeout": _WRITE_TIMEOUT} if local else {}
     try:
         return serial.serial_for_url(name, baudrate=baud_rate, timeout=READ_TIMEOUT, **options)
     except (OSError, termios.error) as error:
@@ -170,14 +171,6 @@ def datagram_address(name: str) -> Tuple[str, int]:
     if not host or not number.isdecimal() or not 0 < int(number) < _PORT_NUMBERS:
         raise PortRefusedError(f"port {name}: must be udp://HOST:PORT with a PORT from 1 to {_PORT_NUMBERS - 1}")
     return host, int(number)
-
-
-def _open_udp_port(name: str) -> UdpPort:
-    address = datagram_address(name)
-    try:
-        return UdpPort(*address, READ_TIMEOUT)
-    except OSError as error:
-        raise PortUnavailableError(f"port {name} cannot be opened: {error.strerror or error}") from error
 
 
 @contextmanager

@@ -30,7 +30,7 @@ ALLOWED = {
     },
     "mlsm_manager": {"georeferencing", "node_support", "recordings", "sonar_processing"},
     "web_page": {"georeferencing", "node_support", "sonar_processing"},
-    "sonar_simulator": {"node_support", "recordings", "sonar_processing"},
+    "sonar_simulator": {"node_support", "recordings", "sonar_driver", "sonar_processing"},
 }
 ROS_NAMES = {
     "rospy", "roslib", "rosgraph", "rosbag", "genpy", "dynamic_reconfigure", "diagnostic_updater",

@@ -7,21 +7,20 @@ from ping360_driver.device import Ping, Ping360Device
 from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
 from ping360_driver.parameters import DriverParameters
 from ping360_driver.scan_command import bin_length, head_angle
-from sonar_driver.emulated_head import EchoSource, FaultInjector
 from sonar_driver.head_server import PtyLine, ServedLine, UdpLine
 from sonar_driver.port import datagram_address, is_datagram_port
-from sonar_driver.ros.nodes import DriverNode, EmulatorNode, HeadModel, SonarModel, WorldEchoes, scan_line
+from sonar_driver.ros.nodes import DriverNode, EmulatorNode, WorldEchoes, scan_line
 from underwater_map_construction.msg import SonarScanLine
 
 
 def run_driver() -> None:
-    model = SonarModel("ping360_driver", DriverParameters, Ping360Device, _message)
-    run(model.name, lambda: DriverNode(model))
+    name = "ping360_driver"
+    run(name, lambda: DriverNode(name, DriverParameters, Ping360Device, _message))
 
 
 def run_emulator(world_echoes: WorldEchoes) -> None:
-    model = HeadModel("ping360_emulator", EmulatorParameters, _head, _line)
-    run(model.name, lambda: EmulatorNode(model, world_echoes))
+    name = "ping360_emulator"
+    run(name, lambda: EmulatorNode(name, EmulatorParameters, EmulatedPing360, _line, world_echoes))
 
 
 def _message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine]:
@@ -31,12 +30,5 @@ def _message(ping: Ping, parameters: DriverParameters) -> Optional[SonarScanLine
     return scan_line(angle, ping.beam.echoes, resolution, pulse.gain_setting)
 
 
-def _head(parameters: EmulatorParameters, source: EchoSource, faults: FaultInjector) -> EmulatedPing360:
-    baud_rate = float("inf") if is_datagram_port(parameters.link) else parameters.baud_rate
-    return EmulatedPing360(source, faults, baud_rate, parameters.speed_of_sound, parameters.auto_transmit)
-
-
-def _line(parameters: EmulatorParameters) -> ServedLine:
-    if is_datagram_port(parameters.link):
-        return UdpLine(*datagram_address(parameters.link))
-    return PtyLine(parameters.link)
+def _line(link: str) -> ServedLine:
+    return UdpLine(*datagram_address(link)) if is_datagram_port(link) else PtyLine(link)

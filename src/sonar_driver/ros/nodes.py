@@ -3,16 +3,15 @@
 import os
 import threading
 from contextlib import ExitStack
-from dataclasses import dataclass
+from functools import partial
 from typing import Any, Callable, Optional, Type
 
 import numpy as np
-import rospkg
 import rospy
 
 from node_support import topics
+from node_support.files import package_folder
 from node_support.headers import check_stamp
-from node_support.health import Health
 from node_support.parameters import ParameterSet
 from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
@@ -26,7 +25,6 @@ from sonar_driver.emulated_head import (
     EmulatedHeadParameters,
     Fault,
     FaultInjector,
-    FixedPattern,
 )
 from sonar_driver.head_server import HeadServer, ServedLine
 from sonar_driver.port import PortError
@@ -37,37 +35,39 @@ _LONGEST_STOP = 1.0  # s: a ping at the longest range ends within this time
 _PAUSE_AFTER_FAILURE = 1.0  # s: a failure that lasts must not fill the log
 
 
-@dataclass(frozen=True)
-class SonarModel:
-    """What the node needs to know of one kind of sonar.
-
-    name: the node's. parameters: those of line, mounting and head, with a `command`;
-    `LineParameters` and `MountingParameters` are among their bases. device: takes parameters, a stop event and a clock.
-    message: makes the message of a ping, but for its header and the angle of the servo; None if it holds no echoes.
-    """
-
-    name: str
-    parameters: Type[ParameterSet]
-    device: Callable[[Any, threading.Event, Callable[[], float]], LineDevice]
-    message: Callable[[Any, Any], Optional[SonarScanLine]]
-
-
 class DriverNode:
     """Keeps the head pinging, and publishes every valid reply once, in order."""
 
-    def __init__(self, model: SonarModel) -> None:
-        """Raises ParameterError for a bad parameter and StartError for an unusable port."""
-        self._model = model
+    def __init__(
+        self,
+        name: str,
+        parameters: Type[ParameterSet],
+        device: Type[LineDevice],
+        message: Callable[[Any, Any], Optional[SonarScanLine]],
+    ) -> None:
+        """Raises ParameterError for a bad parameter and StartError for an unusable port.
+
+        parameters: those of line, mounting and head, with a `command`. message: makes the message of a ping and the
+        parameters, but for its header and the angle of the servo; None if it holds no echoes.
+        """
+        self._make_device = device
+        self._message = message
         self._device: Optional[LineDevice] = None
         self._scanner: Optional[Scanner] = None
         self._stop = threading.Event()
         self._last_stats = LineStats()
-        self.health = DriverHealth(model.name, lambda line: rospy.logwarn("%s", line), self._stats)
+        self.health = DriverHealth(name, lambda line: rospy.logwarn("%s", line), self._stats)
         self.healths = [self.health]
-        self._live = ReconfigurableParameters(model.parameters, "~", self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(parameters, "~", self.health, self._use_parameters)
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
-        self._connect()
+        try:
+            self._scanner.connect()
+        except PortError as error:
+            raise StartError(str(error)) from error
+        stats = self._stats()
+        if not stats.connected:
+            rospy.logwarn("%s: %s; waiting for it", name, stats.last_error)
         self._thread = threading.Thread(target=self._scan, daemon=True)
         self._thread.start()
         rospy.on_shutdown(self._end)
@@ -81,18 +81,9 @@ class DriverNode:
     def _use_parameters(self, parameters: ParameterSet) -> None:
         command = parameters.command()
         if self._scanner is None:
-            self._device = self._model.device(parameters, self._stop, rospy.get_time)
+            self._device = self._make_device(parameters, self._stop, rospy.get_time)
             self._scanner = Scanner(self._device, command, guarded(self.health, self._publish))
         self._scanner.command = command
-
-    def _connect(self) -> None:
-        try:
-            self._scanner.connect()
-        except PortError as error:
-            raise StartError(str(error)) from error
-        stats = self._stats()
-        if not stats.connected:
-            rospy.logwarn("%s: %s; waiting for it", self.health.name, stats.last_error)
 
     def _scan(self) -> None:
         run = guarded(self.health, self._scanner.run)
@@ -104,7 +95,7 @@ class DriverNode:
         # A ping leaves before its reply comes: with a clock near 0 its stamp is negative, which rospy.Time refuses.
         check_stamp(round(ping.stamp * 1e9))
         parameters = self._live.current
-        message = self._model.message(ping, parameters)
+        message = self._message(ping, parameters)
         if message is not None:
             message.header.stamp, message.header.frame_id = rospy.Time.from_sec(ping.stamp), parameters.frame_id
             message.sensorAngle = self._tilt.for_beam()
@@ -130,73 +121,59 @@ def scan_line(angle: float, echoes: bytes, range_resolution: float, gain: int) -
 
 WORLD_FRAME = "world"
 """Frame of the world file that the emulated head hears."""
-
 Place = Callable[[], Optional[np.ndarray]]
 """Returns the (4, 4) T_world_head of now; None where it is not known."""
-PACKAGE = "underwater_map_construction"
-_MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
-# Builds the simulator's echoes; passed in, because no driver may depend on the simulator.
 WorldEchoes = Callable[[EmulatedHeadParameters, Optional[Place]], EchoSource]
-
-
-def place_in_tf(frame: str, health: Health) -> Place:
-    """Return what looks up the newest place of `frame` in the world; pings before tf knows it are counted."""
-    transforms = TfBuffer(health)
-
-    def place() -> Optional[np.ndarray]:
-        found = transforms.newest(WORLD_FRAME, frame)
-        if found is None:
-            health.problem(
-                "pings without a place",
-                f"tf does not know {frame!r} in {WORLD_FRAME!r}; check head_frame and who publishes it",
-            )
-            return None
-        return found[1]
-
-    return place
-
-
-@dataclass(frozen=True)
-class HeadModel:
-    """What the node needs to know of one kind of emulated head.
-
-    name: the node's. head: makes the head. line: makes the line that it is served on,
-    not yet open.
-    """
-
-    name: str
-    parameters: Type[EmulatedHeadParameters]
-    head: Callable[[Any, EchoSource, FaultInjector], EmulatedHead]
-    line: Callable[[Any], ServedLine]
+"""Builds the simulator's echoes; passed in, because no driver may depend on the simulator."""
+_MOST_ORDERED = 100000  # Hours of pings; more is a slip of the keyboard
 
 
 class EmulatorNode:
     """Serves an emulated head until shutdown."""
 
-    def __init__(self, model: HeadModel, world_echoes: WorldEchoes) -> None:
-        """Raises ParameterError for a bad parameter, and StartError when the world or the line cannot be made."""
-        self.health = make_health(model.name)
+    def __init__(
+        self,
+        name: str,
+        parameters: Type[EmulatedHeadParameters],
+        head: Type[EmulatedHead],
+        line: Callable[[str], ServedLine],
+        world_echoes: WorldEchoes,
+    ) -> None:
+        """Raises ParameterError for a bad parameter, and StartError when the world or the line cannot be made.
+
+        line: makes the line of that link, not yet open.
+        """
+        self.health = make_health(name)
         self.healths = [self.health]
         self._faults: Optional[FaultInjector] = None
-        self._live = ReconfigurableParameters(model.parameters, "~", self.health, self._use_parameters)
-        parameters = self._live.current.changed({"link": os.path.expanduser(self._live.current.link)})
-        head = model.head(parameters, self._echo_source(parameters, world_echoes), self._faults)
+        self._live = ReconfigurableParameters(parameters, "~", self.health, self._use_parameters)
+        current = self._live.current.changed({"link": os.path.expanduser(self._live.current.link)})
+        made = head(current, self._echo_source(current, world_echoes), self._faults)
         self._served = ExitStack()
         try:
-            self._served.enter_context(HeadServer(head, model.line(parameters)))
+            self._served.enter_context(HeadServer(made, line(current.link)))
         except OSError as error:
-            raise StartError(f"link = {parameters.link!r}: the port cannot be made: {error}") from error
+            raise StartError(f"link = {current.link!r}: the port cannot be made: {error}") from error
         rospy.on_shutdown(self._served.close)
         rospy.Service("~order_fault", OrderFault, self._order)
         every(DIAGNOSTICS_PERIOD, self._show_counts, self.health)
-        rospy.loginfo("%s: the head is at %s", self.health.name, parameters.link)
+        rospy.loginfo("%s: the head is at %s", name, current.link)
 
-    def _echo_source(self, parameters: EmulatedHeadParameters, world_echoes: WorldEchoes) -> EchoSource:
+    def _echo_source(self, parameters: EmulatedHeadParameters, world_echoes: WorldEchoes) -> Optional[EchoSource]:
         if parameters.echo_source is EchoSourceKind.PATTERN:
-            return FixedPattern(parameters.wall_distance)
-        world_file = os.path.join(rospkg.RosPack().get_path(PACKAGE), os.path.expanduser(parameters.world_file))
-        place = place_in_tf(parameters.head_frame, self.health) if parameters.head_frame else None
+            return None
+        world_file = str(package_folder() / os.path.expanduser(parameters.world_file))
+        place = partial(self._place, TfBuffer(self.health), parameters.head_frame) if parameters.head_frame else None
         return world_echoes(parameters.changed({"world_file": world_file}), place)
+
+    def _place(self, transforms: TfBuffer, frame: str) -> Optional[np.ndarray]:
+        """Return the newest (4, 4) T_world_frame; pings before tf knows it are counted."""
+        found = transforms.newest(WORLD_FRAME, frame)
+        if found is None:
+            detail = f"tf does not know {frame!r} in {WORLD_FRAME!r}; check head_frame and who publishes it"
+            self.health.problem("pings without a place", detail)
+            return None
+        return found[1]
 
     def _use_parameters(self, parameters: EmulatedHeadParameters) -> None:
         if self._faults is None:

@@ -2,12 +2,13 @@
 
 import math
 from dataclasses import dataclass
-from typing import Callable, Optional, Protocol
+from typing import Callable, Optional
 
 import numpy as np
 
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError, ParameterSet, parameter
+from sonar_driver.emulated_head import EmulatedHeadParameters, PingRequest
 from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer
 from sonar_simulator.echoes.echo_model import EchoModel
 from sonar_simulator.echoes.ray_caster import RayCaster
@@ -74,11 +75,6 @@ class Sonar:
         """Far end of the last bin, m."""
         return self._model.max_range
 
-    @property
-    def range_resolution(self) -> float:
-        """Length of a bin, m."""
-        return self._model.max_range / self._model.bins
-
     def ping(self, T_world_sonar: np.ndarray, angle: float) -> np.ndarray:
         """Return the strengths (bins,) uint8 of one beam at head `angle` rad from the (4, 4) pose."""
         return self.pings(T_world_sonar[np.newaxis], np.array([angle]))[0]
@@ -98,30 +94,6 @@ class Sonar:
 
 
 _SPREAD = 0.15  # m: the length of a real head's usual pulse of 100 us
-
-
-class PingRequest(Protocol):
-    """One ping of an emulated head: angle in rad, counter-clockwise, range in m, gain above the usual in dB."""
-
-    angle: float
-    bin_count: int
-    max_range: float
-    gain_db: float
-
-
-class HeadInWorld(Protocol):
-    """The world, the position and heading of the head in it, and its beam: m, degrees counter-clockwise."""
-
-    world_file: str
-    x: float
-    y: float
-    z: float
-    yaw_deg: float
-    beam_height_deg: float
-    beam_width_deg: float
-    seed: int
-
-
 Place = Callable[[], Optional[np.ndarray]]
 """Returns the (4, 4) T_world_sonar of now; None where it is not known."""
 DEFAULT_SONAR = SonarParameters()
@@ -134,22 +106,21 @@ class WorldEchoes:
         """Raises MissingPackageError when the ray caster is not installed."""
         self._caster = RayCaster(world)
         self._place = place
-        self._pattern: BeamPattern = sonar.pattern()
+        self._pattern = sonar.pattern()
         self._rng = np.random.default_rng(seed)
 
-    def echoes(self, ping: PingRequest) -> bytes:
+    def __call__(self, ping: PingRequest) -> bytes:
         """Return `ping.bin_count` echo strengths (0 to 255), nearest bin first; none are heard without a place."""
         pose = self._place()
         if pose is None:
             return bytes(ping.bin_count)
         model = LaserCone(LaserConeParameters(bins=ping.bin_count, max_range=ping.max_range, spread=_SPREAD))
         sonar = Sonar(self._caster, self._pattern, model, self._rng)
-        factor = 10 ** (ping.gain_db / 20)
-        strengths = sonar.ping(pose, ping.angle) * factor
+        strengths = sonar.ping(pose, ping.angle) * 10 ** (ping.gain_db / 20)
         return np.minimum(np.rint(strengths), 255).astype(np.uint8).tobytes()
 
 
-def world_echoes(parameters: HeadInWorld, place: Optional[Place] = None) -> WorldEchoes:
+def world_echoes(parameters: EmulatedHeadParameters, place: Optional[Place] = None) -> WorldEchoes:
     """Load the world; raises ParameterError when the file cannot be used.
 
     place: of a head that moves; without it the head stands still, upright, where the parameters say.

@@ -58,14 +58,14 @@ def test_of_two_replies_that_a_stall_heaped_up_the_newer_is_the_answer(wait):
 def test_silence_ends_the_wait_after_the_margin(wait):
     assert not wait.over(BEGINS + 0.24, pending=False)
     assert wait.over(BEGINS + 0.26, pending=False)
-    assert not wait.answered
+    assert not wait.answer_bytes
 
 
 def test_a_gap_within_a_reply_ends_the_wait(wait):
     wait.take(bytes(100), [], BEGINS + 0.01)
     assert not wait.over(BEGINS + 0.10, pending=True)
     assert wait.over(BEGINS + 0.12, pending=True)
-    assert wait.answered
+    assert wait.answer_bytes
 
 
 def test_enough_bytes_without_a_reply_end_the_wait_at_once(wait):
@@ -148,7 +148,7 @@ class FixedReplyHead(Emulated852):
     ],
 )
 def test_an_answer_to_another_question_is_a_bad_frame(asked, complaint):
-    device = VirtualScan(IMAGENEX_852, head=lambda *line: FixedReplyHead(*line, head_id=asked.head_id)).device
+    device = VirtualScan(IMAGENEX_852, head=FixedReplyHead, told={"head_id": asked.head_id}).device
     assert device.ping(asked) is None
     assert complaint in device.stats.last_error
 
@@ -187,11 +187,7 @@ def test_a_device_that_only_echoes_gives_bad_frames():
 
 
 def test_replies_before_sound_can_have_returned_are_dropped_and_counted_on_their_own():
-    timing = ConnectionParameters(speed_of_sound=2000.0).timing()
-    scan = VirtualScan(
-        IMAGENEX_852, head=lambda echoes, faults, _: Emulated852(echoes, faults, timing),
-        baud_rate=115200, speed_of_sound=1400.0,
-    )  # fmt: skip
+    scan = VirtualScan(IMAGENEX_852, told={"speed_of_sound": 2000.0}, baud_rate=115200, speed_of_sound=1400.0)
     assert [scan.device.ping(COMMAND) for _ in range(5)] == [None] * 5
     assert (scan.stats.early_replies, scan.stats.unexpected_replies, scan.stats.timeouts) == (5, 0, 5)
 

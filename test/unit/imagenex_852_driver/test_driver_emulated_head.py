@@ -5,7 +5,7 @@ import pytest
 from imagenex_852_driver.command import SwitchCommand
 from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters, HeadRotation
 from imagenex_852_driver.reply import ReplyKind, ReplyParser
-from sonar_driver.emulated_head import EchoSource, Fault, FaultInjector
+from sonar_driver.emulated_head import Fault, FaultInjector
 
 COMMAND = SwitchCommand(max_range=30, data_points=500)
 
@@ -21,11 +21,11 @@ def head_with(fault):
     return Emulated852(faults=faults)
 
 
-class Recorder(EchoSource):
+class Recorder:
     def __init__(self):
         self.pings = []
 
-    def echoes(self, ping):
+    def __call__(self, ping):
         self.pings.append(ping)
         return bytes(ping.bin_count)
 
@@ -48,7 +48,7 @@ def test_a_rebooted_head_starts_straight_ahead():
 
 
 def test_a_command_for_another_head_is_ignored():
-    assert answers(Emulated852(head_id=0x11)) == []
+    assert answers(Emulated852(EmulatorParameters(head_id=0x11))) == []
 
 
 def test_a_command_in_pieces_is_answered_when_it_is_whole():
@@ -84,7 +84,7 @@ def test_the_fixed_pattern_has_its_wall_where_it_says():
 
 def test_the_echo_source_gets_the_angle_counter_clockwise():
     source = Recorder()
-    head = Emulated852(source)
+    head = Emulated852(echo_source=source)
     answers(head)
     answers(head, time=5.0)
     assert source.pings[1].angle == pytest.approx(-0.05235988)

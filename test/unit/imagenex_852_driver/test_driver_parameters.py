@@ -82,12 +82,6 @@ def test_the_driver_refuses_what_the_line_the_head_or_the_node_cannot_do(values,
         DriverParameters.from_mapping(values)
 
 
-def test_the_drivers_parameters_command_the_head_and_time_the_line():
-    parameters = DriverParameters(max_range=30, baud_rate=9600)
-    assert parameters.command().max_range == 30
-    assert parameters.timing().baud_rate == 9600
-
-
 def test_the_port_cannot_be_changed_while_the_driver_runs():
     names = {field.name for field in DriverParameters.tunable_fields()}
     assert "max_range" in names

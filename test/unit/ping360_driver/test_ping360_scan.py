@@ -1,7 +1,6 @@
 """The Ping360 scans by itself or is asked for every ping; who is at the other end of its line."""
 
 import time
-from functools import partial
 from types import SimpleNamespace
 
 import numpy as np
@@ -59,7 +58,7 @@ def test_a_head_that_refuses_to_scan_by_itself_is_asked_for_every_ping():
 
 
 def test_older_firmware_is_asked_for_every_ping(port):
-    scan = VirtualScan(PING360, port, head=partial(EmulatedPing360, auto_transmit=False))
+    scan = VirtualScan(PING360, port, told={"auto_transmit": False})
     scan.beams(3)
     assert (scan.stats.mode, scan.stats.firmware, scan.stats.refusals) == ("request", "3.1.1", 0)
 
@@ -163,7 +162,7 @@ class EchoSounder(EmulatedPing360):
 
 @pytest.mark.parametrize(("head", "complaint"), [(Nobody, "no Ping360 answers at"), (EchoSounder, "is no Ping360")])
 def test_a_line_without_a_ping360_is_not_connected(tmp_path, head, complaint):
-    with served(PING360, tmp_path / "sonar", head(baud_rate=1152000)) as (_, connection):
+    with served(PING360, tmp_path / "sonar", head(EmulatorParameters(baud_rate=1152000))) as (_, connection):
         device = Ping360Device(connection)
         with pytest.raises(PortUnavailableError, match=complaint):
             device.open()

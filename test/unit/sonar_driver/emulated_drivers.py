@@ -6,7 +6,7 @@ import threading
 import time
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Callable, List, Tuple
+from typing import Callable, List, Tuple
 
 from virtual_line import VirtualLine, VirtualStop, VirtualTime
 
@@ -18,7 +18,7 @@ from ping360_driver import emulated_ping360
 from ping360_driver.device import Ping360Device
 from ping360_driver.parameters import HeadSettings
 from sonar_driver.device import LineDevice, Scanner
-from sonar_driver.emulated_head import EchoSource, Fault, FaultInjector, FaultRates
+from sonar_driver.emulated_head import Fault, FaultInjector, FaultRates
 from sonar_driver.head_server import HeadServer, PtyLine, UdpLine
 from sonar_driver.port import LineParameters, datagram_address, is_datagram_port
 
@@ -39,8 +39,7 @@ _MOST_PINGS = 1000
 class Sonar:
     """A sonar's driver and head.
 
-    line: what the head is told of its line. good: faults in spite of which a ping brings its beam. optional: those in
-    spite of which it may.
+    good: faults in spite of which a ping brings its beam. optional: those in spite of which it may.
     """
 
     device: Callable[..., LineDevice]
@@ -48,7 +47,6 @@ class Sonar:
     rates: Callable[..., FaultRates]
     settings: ParameterSet
     connection: LineParameters
-    line: Callable[[Any], Any]
     good: Tuple[Fault, ...]
     optional: Tuple[Fault, ...] = ()
 
@@ -56,13 +54,11 @@ class Sonar:
         """Return the parameters of a fast line."""
         return replace(self.connection, port=port, **changes)
 
-    def emulated(self, connection, faults=None, echoes=None, head=None):
-        """Return a head on a line; `head` is another class of it."""
-        return (head or self.head)(echoes or NumberedEchoes(), faults, self.line(connection))
-
-
-def _baud_rate(connection):
-    return math.inf if is_datagram_port(connection.port) else connection.baud_rate
+    def emulated(self, connection, faults=None, echoes=None, head=None, **told):
+        """Return a head on a line; `head` is another class of it, `told` are other parameters than the line's."""
+        line = {"baud_rate": connection.baud_rate, "speed_of_sound": getattr(connection, "speed_of_sound", 1500.0)}
+        parameters = self.rates(link=connection.port, **{**line, **told})
+        return (head or self.head)(parameters, echoes or NumberedEchoes(), faults)
 
 
 IMAGENEX_852 = Sonar(
@@ -71,7 +67,6 @@ IMAGENEX_852 = Sonar(
     rates=emulated_852.EmulatorParameters,
     settings=parameters_852.HeadSettings(max_range=50),
     connection=parameters_852.ConnectionParameters(speed_of_sound=15000.0, **FAST),
-    line=lambda connection: connection.timing(),
     good=(Fault.NONE, Fault.DOUBLED, Fault.OVERRUN),
 )
 PING360 = Sonar(
@@ -81,7 +76,6 @@ PING360 = Sonar(
     # The shortest beams: 1.3 ms of listening, 2 ms of sending.
     settings=HeadSettings(max_range=1.0, data_points=200),
     connection=LineParameters(**FAST),
-    line=_baud_rate,
     good=(Fault.NONE, Fault.DOUBLED, Fault.LATE),
 )
 # A request is answered in time if the head was given the time for a whole turn.
@@ -94,13 +88,13 @@ PING360_REQUESTS = replace(
 SONARS = {"imagenex_852": IMAGENEX_852, "ping360": PING360, "ping360_requests": PING360_REQUESTS}
 
 
-class NumberedEchoes(EchoSource):
+class NumberedEchoes:
     """Writes the number of the ping into the first echoes, and remembers when each ping left."""
 
     def __init__(self):
         self.times = []
 
-    def echoes(self, ping):
+    def __call__(self, ping):
         self.times.append(ping.time)
         return (len(self.times) - 1).to_bytes(4, "big") + bytes(ping.bin_count - 4)
 
@@ -229,17 +223,17 @@ def free_udp_port():
 class VirtualScan:
     """A driver in virtual time, always the same however busy the machine is; `pings` brought a beam.
 
-    head: the class of the head. changes: of the line's parameters.
+    head: the class of the head. told: parameters of the head. changes: of the line's parameters.
     """
 
-    def __init__(self, sonar, port="virtual", settings=None, faults=None, stop=None, head=None, **changes):
+    def __init__(self, sonar, port="virtual", settings=None, faults=None, stop=None, head=None, told=(), **changes):
         self.settings = settings or sonar.settings
         self.pings = []
         self.echoes = NumberedEchoes()
         stop = stop or VirtualStop(VirtualTime())
         self.time = stop.time
         connection = sonar.connection_to(port, **{**EXACT, **changes})
-        self.head = sonar.emulated(connection, faults, self.echoes, head)
+        self.head = sonar.emulated(connection, faults, self.echoes, head, **dict(told))
         baud_rate = math.inf if is_datagram_port(port) else connection.baud_rate
         line = VirtualLine(self.head, baud_rate, stop.time)
         self.device = sonar.device(connection, stop, self.clock, stop.time.elapsed, line.open)

@@ -73,9 +73,8 @@ def test_a_single_ping_is_a_batch_of_one():
     )
 
 
-def test_parameters_give_pattern_and_range_resolution():
+def test_parameters_give_pattern_and_range():
     assert SonarParameters().pattern() == PATTERN
-    assert _sonar(WALLS).range_resolution == 0.1
     assert _sonar(WALLS).max_range == 50.0
 
 
@@ -105,30 +104,30 @@ def mean_range(echoes, max_range):
 
 @pytest.mark.parametrize(("bin_count", "max_range"), [(500, 20), (252, 20), (500, 50)])
 def test_a_wall_is_heard_where_it_stands_whatever_the_head_is_told(source, bin_count, max_range):
-    echoes = source.echoes(ping(bin_count=bin_count, max_range=max_range))
+    echoes = source(ping(bin_count=bin_count, max_range=max_range))
     assert len(echoes) == bin_count
     assert mean_range(echoes, max_range) == pytest.approx(10.1, abs=0.5)
 
 
 @pytest.mark.parametrize("where", [{"angle": math.pi}, {"max_range": 5}])
 def test_open_water_or_a_wall_out_of_reach_is_silent(source, where):
-    assert not any(source.echoes(ping(**where)))
+    assert not any(source(ping(**where)))
 
 
 def test_less_gain_makes_weaker_echoes(source):
-    assert sum(source.echoes(ping(gain=-12))) < 0.5 * sum(source.echoes(ping()))
+    assert sum(source(ping(gain=-12))) < 0.5 * sum(source(ping()))
 
 
 def test_the_head_hears_from_where_it_was_placed():
     place = pose_matrix((5.0, 0.0, 0.0), (0.0, 0.0, math.pi))
     source = WorldEchoes(WALL, lambda: place, seed=1)
-    assert mean_range(source.echoes(ping(angle=math.pi)), 20) == pytest.approx(5.0, abs=0.5)
+    assert mean_range(source(ping(angle=math.pi)), 20) == pytest.approx(5.0, abs=0.5)
 
 
 def test_a_head_that_moves_hears_from_where_it_is_at_each_ping():
     places = iter([pose_matrix((5.0, 0.0, 0.0)), None, pose_matrix((2.0, 0.0, 0.0))])
     source = WorldEchoes(WALL, lambda: next(places), seed=1)
-    near, nowhere, far = (source.echoes(ping()) for _ in range(3))
+    near, nowhere, far = (source(ping()) for _ in range(3))
     assert [mean_range(near, 20), mean_range(far, 20)] == pytest.approx([5.1, 8.1], abs=0.5)
     assert nowhere == bytes(500)
 
