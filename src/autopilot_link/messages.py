@@ -2,7 +2,7 @@
 
 import math
 from enum import IntEnum
-from typing import Any, Dict, List, Optional, Sequence
+from typing import Any, Dict, List, Optional
 
 from autopilot_link.parameters import PoseMessage
 from autopilot_link.protocol import StatedPose
@@ -70,8 +70,8 @@ class Writer:
 
     def pose(self, system: int, firmware: Firmware, kind: PoseMessage, pose: StatedPose) -> bytes:
         """Return a position with the stamp that it has."""
-        make = _odometry if kind is PoseMessage.ODOMETRY else _vision_position
-        return self._packed(system, make(pose, firmware))
+        is_odometry = kind is PoseMessage.ODOMETRY
+        return self._packed(system, _odometry(pose, firmware) if is_odometry else _vision_position(pose))
 
     def _packed(self, system: int, message: Any) -> bytes:
         self._header.srcSystem = system
@@ -83,19 +83,15 @@ class Writer:
 def _odometry(pose: StatedPose, firmware: Firmware) -> Any:
     # ArduPilot takes its north, east, down by this name only; PX4 takes the name for axes of unknown heading.
     frame = mavlink.MAV_FRAME_LOCAL_NED if firmware is Firmware.PX4 else mavlink.MAV_FRAME_LOCAL_FRD
+    x, y, z, w = quaternion_of(pose.in_ned).tolist()
     return mavlink.MAVLink_odometry_message(
-        pose.stamp_ns // 1000, frame, mavlink.MAV_FRAME_BODY_FRD, *pose.in_ned[:3, 3], _scalar_first(pose),
+        pose.stamp_ns // 1000, frame, mavlink.MAV_FRAME_BODY_FRD, *pose.in_ned[:3, 3], [w, x, y, z],
         *pose.velocity_frd, math.nan, math.nan, math.nan, pose.covariance_ned.tolist(), _UNKNOWN, pose.reset_counter,
     )  # fmt: skip
 
 
-def _vision_position(pose: StatedPose, firmware: Firmware) -> Any:
+def _vision_position(pose: StatedPose) -> Any:
     position, angles = pose.in_ned[:3, 3], pose.roll_pitch_yaw
     return mavlink.MAVLink_vision_position_estimate_message(
         pose.stamp_ns // 1000, *position, *angles, pose.covariance_ned.tolist(), pose.reset_counter
     )
-
-
-def _scalar_first(pose: StatedPose) -> Sequence[float]:
-    x, y, z, w = quaternion_of(pose.in_ned).tolist()
-    return [w, x, y, z]

@@ -167,8 +167,10 @@ class DeadReckoner:
             level = rotated((rotation @ velocity)[:2], -yaw)
         self._position[:2] += elapsed * rotated(level, yaw - turn / 2.0)
         self._stamp_ns, self._yaw = stamp_ns, yaw
+        T_odom_base = np.eye(4)
+        T_odom_base[:3, :3], T_odom_base[:3, 3] = rotation[:3, :3], self._position
         gap = elapsed if elapsed > self.parameters.longest_gap else 0.0
-        return Reckoning(stamp_ns, self._pose(rotation), velocity, turn_rate, gap)
+        return Reckoning(stamp_ns, T_odom_base, velocity, turn_rate, gap)
 
     def _velocity_at(self, stamp_ns: int, turn_rate: float) -> np.ndarray:
         own = self.parameters
@@ -181,12 +183,6 @@ class DeadReckoner:
         overdue = 0.0 if commanded else self._velocities.overdue(stamp_ns * 1e-9)
         x, y = self._instrument
         return math.exp(-overdue / own.velocity_fading) * (self._velocity + turn_rate * np.array([y, -x, 0.0]))
-
-    def _pose(self, rotation: np.ndarray) -> np.ndarray:
-        pose = np.eye(4)
-        pose[:3, :3] = rotation[:3, :3]
-        pose[:3, 3] = self._position
-        return pose
 
 
 def depth_of_pressure(pressure: float, surface_pressure: float, density: float) -> float:

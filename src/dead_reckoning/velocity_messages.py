@@ -65,12 +65,12 @@ class VelocityType:
 
 def _twist(message: Any) -> VelocityFields:
     twist = getattr(message.twist, "twist", message.twist)
-    return VelocityFields(stamp_ns(message.header), _frame(message.header.frame_id), _vector(twist.linear))
+    return _fields(message, message.header.frame_id, twist.linear)
 
 
 def _odometry(message: Any) -> VelocityFields:
     """Read the twist of an Odometry, which is along the axes of its child frame."""
-    return VelocityFields(stamp_ns(message.header), _frame(message.child_frame_id), _vector(message.twist.twist.linear))
+    return _fields(message, message.child_frame_id, message.twist.twist.linear)
 
 
 def _dvl(message: Any) -> VelocityFields:
@@ -78,7 +78,7 @@ def _dvl(message: Any) -> VelocityFields:
     covariance = getattr(message, "velocity_covariance", (0.0,))
     valid = getattr(message, "velocity_valid", getattr(message, "beam_velocities_valid", covariance[0] != _INVALID))
     _check(valid)
-    return VelocityFields(stamp_ns(message.header), _frame(message.header.frame_id), _vector(message.velocity))
+    return _fields(message, message.header.frame_id, message.velocity)
 
 
 def _transducer_report(message: Any) -> VelocityFields:
@@ -94,12 +94,9 @@ def _check(valid: bool) -> None:
         raise RefusedInput(VELOCITIES_REFUSED, "the DVL hears no bottom")
 
 
-def _frame(name: str) -> str:
-    return name.lstrip("/")
-
-
-def _vector(value: Any) -> np.ndarray:
-    return np.array([value.x, value.y, value.z], dtype=np.float64)
+def _fields(message: Any, frame_id: str, velocity: Any) -> VelocityFields:
+    vector = np.array([velocity.x, velocity.y, velocity.z], dtype=np.float64)
+    return VelocityFields(stamp_ns(message.header), frame_id.lstrip("/"), vector)
 
 
 _NAMES: Tuple[Tuple[Tuple[str, ...], VelocityType], ...] = (

@@ -50,7 +50,8 @@ def whole_file(path: Path) -> Iterator[Path]:
     handle, temporary = _locked_part(path)
     try:
         yield temporary
-        _flush(temporary)
+        with temporary.open("rb") as file:
+            os.fsync(file.fileno())
         os.chmod(str(temporary), 0o644)
         os.replace(str(temporary), str(path))
     except BaseException as error:
@@ -129,11 +130,6 @@ def _took_lock(handle: int) -> bool:
     return True
 
 
-def _flush(path: Path) -> None:
-    with path.open("rb") as file:
-        os.fsync(file.fileno())
-
-
 def package_folder() -> Path:
     """Return the folder of the package: a checkout, or share/ of what catkin or pip has installed.
 
@@ -141,11 +137,7 @@ def package_folder() -> Path:
     """
     for folder in Path(__file__).resolve().parents:
         for candidate in (folder, folder / "share" / PACKAGE):
-            if _is_package(candidate):
+            description = candidate / "package.xml"
+            if description.is_file() and _MARK in description.read_text(encoding="utf-8"):
                 return candidate
     raise FileNotFoundError(2, "the package's folder is not beside its modules; install the whole package", PACKAGE)
-
-
-def _is_package(folder: Path) -> bool:
-    description = folder / "package.xml"
-    return description.is_file() and _MARK in description.read_text(encoding="utf-8")

@@ -176,8 +176,13 @@ class Health:
                 self._processing = [count + 1, total + seconds, max(longest, seconds)]
 
     def report(self) -> HealthReport:
-        """Return the state since the start, with rates since the previous report."""
-        self._warn_of_missed()
+        """Return the state since the start, with rates since the previous report; warn of topics that never came."""
+        with self._lock:
+            now = self._clock()
+            missed = {topic: one.missed(now) for topic, one in self._inputs.items()}
+        for topic, seconds in missed.items():
+            if seconds:
+                self._warn(f"{self.name}: nothing came on {topic} for {seconds:.0f} s: does anybody publish it?")
         with self._lock:
             now = self._clock()
             values = self._counter_values(max(now - self._last_report, 1e-9))
@@ -193,14 +198,6 @@ class Health:
         ceased = {f"nothing on {topic} for {seconds:.0f} s": Level.WARN for topic, seconds in self.silent().items()}
         recent = {**ceased, **recent}
         return HealthReport(max(recent.values(), default=Level.OK), "; ".join(recent) or "running", values)
-
-    def _warn_of_missed(self) -> None:
-        with self._lock:
-            now = self._clock()
-            missed = {topic: one.missed(now) for topic, one in self._inputs.items()}
-        for topic, seconds in missed.items():
-            if seconds:
-                self._warn(f"{self.name}: nothing came on {topic} for {seconds:.0f} s: does anybody publish it?")
 
     def _counter_values(self, seconds: float) -> Dict[str, str]:
         values = {}

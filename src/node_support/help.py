@@ -64,27 +64,18 @@ def write_help(text: str, file: IO[str]) -> None:
 
 
 def answer_help(
-    node: str, parameters: Type[ParameterSet], groups: Mapping[str, Type[ParameterSet]] = _NOTHING, tunable: bool = True
-) -> None:
+    node: str, parameters: Optional[Type[ParameterSet]], groups: Mapping[str, Type[ParameterSet]] = _NOTHING,
+    tunable: bool = True,
+) -> None:  # fmt: skip
     """Print the help of a node and end the process, if its command line asks for help; otherwise do nothing.
 
-    parameters: those in the node's own namespace. groups: those in namespaces below it, by their names.
-    tunable: whether dynamic_reconfigure can change parameters while the node runs.
+    parameters: those in the node's own namespace; None for a node that hosts others. groups: those in namespaces below
+    it, by their names. tunable: whether dynamic_reconfigure can change parameters while the node runs.
     """
-    if _is_asked():
-        write_help(node_help(node, {"": parameters, **groups}, tunable), sys.stdout)
+    if any(argument in _QUESTIONS for argument in sys.argv[1:]):
+        text = host_help(node) if parameters is None else node_help(node, {"": parameters, **groups}, tunable)
+        write_help(text, sys.stdout)
         sys.exit(0)
-
-
-def answer_pipeline_help(host: str) -> None:
-    """Do as `answer_help` for a node that hosts several nodes in one process."""
-    if _is_asked():
-        write_help(host_help(host), sys.stdout)
-        sys.exit(0)
-
-
-def _is_asked() -> bool:
-    return any(argument in _QUESTIONS for argument in sys.argv[1:])
 
 
 def node_help(node: str, groups: Mapping[str, Type[ParameterSet]], tunable: bool) -> str:

@@ -19,7 +19,7 @@ from difflib import get_close_matches
 from enum import Enum
 from functools import lru_cache
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Sequence, Tuple, Type, TypeVar
+from typing import Any, Callable, Dict, Iterable, List, Mapping, Optional, Tuple, Type, TypeVar
 
 import yaml
 
@@ -128,7 +128,9 @@ class ParameterSet:
             elif gone:
                 remarks.append(f"{key} -> nothing ({gone})")
             else:
-                raise ParameterError(f"{key} = {given[key]!r}: no such parameter; {_names_like(key, known)}")
+                guess = "".join(f"did you mean {name}? " for name in get_close_matches(key, known, n=1))
+                text = f"{key} = {given[key]!r}: no such parameter; {guess}there are {', '.join(known)}"
+                raise ParameterError(text)
         for key, value in found.items():
             if isinstance(value, str) and (key, value) in _OLD_VALUES:
                 found[key] = _OLD_VALUES[key, value]
@@ -163,8 +165,7 @@ class ParameterSet:
 
     def to_mapping(self) -> Dict[str, Any]:
         """Return plain values (enumerations by value), as yaml and the parameter server hold them."""
-        values = {field.name: getattr(self, field.name) for field in dataclasses.fields(self)}
-        return {key: value.value if isinstance(value, Enum) else value for key, value in values.items()}
+        return {field.name: _plain(getattr(self, field.name)) for field in dataclasses.fields(self)}
 
     def part(self, kind: Type[Part]) -> Part:
         """Return the parameters of one of the sets that this one is made of."""
@@ -211,12 +212,6 @@ def with_defaults(**defaults: Any) -> Callable[[type], type]:
         return derived
 
     return changed
-
-
-def _names_like(key: str, known: Sequence[str]) -> str:
-    """Say which parameters there are, first the one that `key` may have meant."""
-    guess = get_close_matches(key, known, n=1)
-    return "".join(f"did you mean {name}? " for name in guess) + f"there are {', '.join(known)}"
 
 
 def _validated(field: dataclasses.Field, value: Any) -> Any:
@@ -273,14 +268,13 @@ def assigned_values(texts: Iterable[str]) -> Dict[str, Any]:
 
     Raises ParameterError for a text without key, without = or whose value is no yaml.
     """
-    return dict(_assigned(text) for text in texts)
-
-
-def _assigned(text: str) -> Tuple[str, Any]:
-    key, equals, value = text.partition("=")
-    if not (key and equals):
-        raise ParameterError(f"--set {text}: must be KEY=VALUE")
-    try:
-        return key, yaml.safe_load(value)
-    except yaml.YAMLError as error:
-        raise ParameterError(f"--set {text}: {value!r} is no yaml value") from error
+    values = {}
+    for text in texts:
+        key, equals, value = text.partition("=")
+        if not (key and equals):
+            raise ParameterError(f"--set {text}: must be KEY=VALUE")
+        try:
+            values[key] = yaml.safe_load(value)
+        except yaml.YAMLError as error:
+            raise ParameterError(f"--set {text}: {value!r} is no yaml value") from error
+    return values

@@ -8,8 +8,8 @@ import numpy as np
 from node_support.errors import RefusedInput
 
 HIGHEST_STRENGTH = 255  # Of an echo; sonars send bytes
+# Returns T_frame_sonar (m, 4, 4) in a frame at times (m,) [s], NaN where nobody knows it.
 SonarPoses = Callable[[str, np.ndarray], np.ndarray]
-"""Returns T_frame_sonar (m, 4, 4) in a frame at times (m,) [s], NaN where nobody knows it."""
 _FOUR_TRUE = np.ones(4, dtype=bool).view(np.uint32)[0]
 
 
@@ -67,19 +67,15 @@ class Cloud:
         An organised cloud keeps its shape: the other points become NaN.
         """
         if self.is_organized:
-            points = np.where(keep[:, np.newaxis], self.points, np.float32(np.nan))
-            return replace(self, points=points)
-        return self._taken(np.flatnonzero(keep))
+            return replace(self, points=np.where(keep[:, np.newaxis], self.points, np.float32(np.nan)))
+        return self.take(np.flatnonzero(keep))
 
     def take(self, places: np.ndarray) -> "Cloud":
         """Return the cloud with the points of these numbers (m,), ascending, as `select` does."""
-        if not self.is_organized:
-            return self._taken(places)
-        keep = np.zeros(len(self), dtype=bool)
-        keep[places] = True
-        return self.select(keep)
-
-    def _taken(self, places: np.ndarray) -> "Cloud":
+        if self.is_organized:
+            keep = np.zeros(len(self), dtype=bool)
+            keep[places] = True
+            return self.select(keep)
         return replace(self, points=self.points.take(places, axis=0), time_stamps=self.time_stamps.take(places))
 
 
@@ -96,3 +92,6 @@ class CloudSink:
 
     take: Callable[[Cloud], None]
     is_wanted: Callable[[], bool] = lambda: True
+
+
+NOBODY = CloudSink(lambda cloud: None, lambda: False)

@@ -124,15 +124,15 @@ class Instruments:
 class AutopilotLinkNode:
     """Sends the position at the newest odometry, as often as `rate` says, while it is good."""
 
-    def __init__(self, namespace: str = "~") -> None:
-        """Raises ParameterError for a bad parameter in `namespace`, StartError for a connection that is none."""
+    def __init__(self) -> None:
+        """Raises ParameterError for a bad parameter, StartError for a connection that is none."""
         self.health = make_health("autopilot_link")
         self.healths = [self.health]
         self._lock = threading.Lock()
         self._corrections = Corrections()
         self._status: Optional[Tuple[float, PositionStatus]] = None
         self._due_ns, self._last = 0, (0, np.eye(4))
-        self._live = ReconfigurableParameters(AutopilotLinkParameters, namespace, self.health, lambda _: None)
+        self._live = ReconfigurableParameters(AutopilotLinkParameters, "~", self.health, lambda _: None)
         parameters = self._live.current
         self._output = self._opened(parameters)
         self._transforms = TfBuffer(

@@ -39,13 +39,13 @@ _NO_ORIENTATION = -1.0  # sensor_msgs/Imu: in the first covariance of a device t
 class DeadReckoning:
     """Publishes at the rate of the headings."""
 
-    def __init__(self, namespace: str = "~") -> None:
-        """Raises ParameterError for a bad parameter in `namespace`."""
+    def __init__(self) -> None:
+        """Raises ParameterError for a bad parameter."""
         self.health = make_health("dead_reckoning")
         self.healths = [self.health]
         self._lock = threading.Lock()
         self._classes = MessageClasses()
-        self._live = ReconfigurableParameters(DeadReckoningParameters, namespace, self.health, self._use_parameters)
+        self._live = ReconfigurableParameters(DeadReckoningParameters, "~", self.health, self._use_parameters)
         self._transforms = TfBuffer(self.health, tolerance=self._live.current.stamp_tolerance)
         self._broadcaster = tf2_ros.TransformBroadcaster()
         self._odometry = rospy.Publisher(topics.ODOMETRY, Odometry, queue_size=QUEUE_SIZE)
@@ -129,8 +129,7 @@ class DeadReckoning:
         with self._lock:
             reckoning = self._reckoner.take_orientation(stamp_ns, rotation)
         if reckoning.gap:
-            detail = f"{reckoning.gap:.1f} s before {stamp_ns * 1e-9:.3f} s; check the compass"
-            self.health.problem(GAPS, detail)
+            self.health.problem(GAPS, f"{reckoning.gap:.1f} s before {stamp_ns * 1e-9:.3f} s; check the compass")
         self._publish(reckoning)
 
     def _orientation_of_vehicle(self, message: Imu) -> np.ndarray:

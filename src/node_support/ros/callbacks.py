@@ -139,16 +139,13 @@ class MessageClasses:
     def deserialised(self, message: rospy.AnyMsg) -> genpy.Message:
         """Return the message; raises RefusedInput when definition and bytes do not make one."""
         header = message._connection_header
-        made = self._class_of(header["type"], header["md5sum"], header.get("message_definition", ""))
+        md5sum = header["md5sum"]
+        if md5sum not in self._classes:
+            self._classes[md5sum] = _generated(header["type"], header.get("message_definition", ""))
         try:
-            return made().deserialize(message._buff)
+            return self._classes[md5sum]().deserialize(message._buff)
         except (genpy.DeserializationError, ValueError, MemoryError) as error:
             raise RefusedInput(_KIND, f"{header['type']}: {error}") from error
-
-    def _class_of(self, name: str, md5sum: str, definition: str) -> type:
-        if md5sum not in self._classes:
-            self._classes[md5sum] = _generated(name, definition)
-        return self._classes[md5sum]
 
 
 def _generated(name: str, definition: str) -> type:

@@ -9,6 +9,7 @@ import threading
 import time
 import xmlrpc.client
 from contextlib import suppress
+from functools import partial
 from typing import Any, Callable, NoReturn, Optional, Protocol, Sequence
 
 import rosgraph
@@ -128,19 +129,16 @@ def publish_diagnostics(healths: Sequence[Health]) -> None:
     updater = Updater()
     updater.setHardwareID("none")
     for health in healths:
-        updater.add(health.name, _filler(health))
+        updater.add(health.name, partial(_fill, health))
     every(DIAGNOSTICS_PERIOD, updater.force_update, healths[0])
 
 
-def _filler(health: Health) -> Callable[[DiagnosticStatusWrapper], DiagnosticStatusWrapper]:
-    def fill(status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
-        report = health.report()
-        status.summary(int(report.level), report.text)
-        for key, value in report.values.items():
-            status.add(key, value)
-        return status
-
-    return fill
+def _fill(health: Health, status: DiagnosticStatusWrapper) -> DiagnosticStatusWrapper:
+    report = health.report()
+    status.summary(int(report.level), report.text)
+    for key, value in report.values.items():
+        status.add(key, value)
+    return status
 
 
 class _ImpatientTransport(xmlrpc.client.Transport):

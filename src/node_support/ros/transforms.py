@@ -4,13 +4,14 @@ import math
 import threading
 import time
 from collections import deque
+from functools import partial
 from typing import Callable, Deque, Dict, Hashable, Iterator, Optional, Tuple
 
 import genpy
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Pose, Quaternion, Transform, TransformStamped, Vector3
+from geometry_msgs.msg import Pose, Quaternion, Transform, TransformStamped
 from sensor_msgs.msg import JointState
 from tf2_msgs.msg import TFMessage
 
@@ -86,7 +87,7 @@ class TfBuffer:
         self._parents: Dict[str, Tuple[str, float]] = {}
         self.clock = StandingClock()
         for topic, add in ((topics.TRANSFORMS, self._add), (topics.STATIC_TRANSFORMS, self._add_static)):
-            rospy.Subscriber(topic, TFMessage, guarded(health, self._taker(add)), queue_size=_QUEUE_SIZE)
+            rospy.Subscriber(topic, TFMessage, guarded(health, partial(self._take, add)), queue_size=_QUEUE_SIZE)
 
     def check_stamp(self, stamp_ns: int) -> None:
         """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
@@ -146,19 +147,16 @@ class TfBuffer:
         if clock:
             yield clock
 
-    def _taker(self, add: Callable[[TransformStamped, str], None]) -> Callable[[TFMessage], None]:
-        def take(message: TFMessage) -> None:
-            publisher = message._connection_header.get("callerid", "unknown")
-            with self._condition:
-                for transform in message.transforms:
-                    try:
-                        add(transform, publisher)
-                    except RefusedInput as refused:
-                        self._health.problem(refused.kind, f"{publisher}: {refused}")
-                self._condition.notify_all()
-            self._on_news()
-
-        return take
+    def _take(self, add: Callable[[TransformStamped, str], None], message: TFMessage) -> None:
+        publisher = message._connection_header.get("callerid", "unknown")
+        with self._condition:
+            for transform in message.transforms:
+                try:
+                    add(transform, publisher)
+                except RefusedInput as refused:
+                    self._health.problem(refused.kind, f"{publisher}: {refused}")
+            self._condition.notify_all()
+        self._on_news()
 
     def _add(self, transform: TransformStamped, publisher: str) -> None:
         stamp_ns, child = transform.header.stamp.to_nsec(), transform.child_frame_id
@@ -192,7 +190,11 @@ class TfBuffer:
             raise RefusedInput(_KIND, f"{child!r} in itself")
         if child not in self._newest_ns and len(self._newest_ns) >= _MOST_FRAMES:
             raise RefusedInput(_KIND, f"{child!r} after {_MOST_FRAMES} other frames; check who publishes so many")
-        _check_pose(transform.transform.translation, transform.transform.rotation)
+        shift, turn = transform.transform.translation, transform.transform.rotation
+        squared_norm = turn.x * turn.x + turn.y * turn.y + turn.z * turn.z + turn.w * turn.w
+        if not (math.isfinite(shift.x + shift.y + shift.z) and abs(squared_norm - 1.0) < _SQUARED_NORM_ERROR):
+            shown = f"translation {shift.x} {shift.y} {shift.z}, quaternion {turn.x} {turn.y} {turn.z} {turn.w}"
+            raise RefusedInput(_KIND, f"{shown}, must be finite and of length 1")
         self._check_parent(child, parent)
 
     def _check_parent(self, child: str, parent: str) -> None:
@@ -270,13 +272,6 @@ def stamp_of(time: float) -> int:
     Seconds in a float are rounded; a microsecond earlier, tf's newest pose can be asked for at its own time.
     """
     return max(round((time - _ROUNDING) * 1e9), 1)
-
-
-def _check_pose(shift: Vector3, turn: Quaternion) -> None:
-    squared_norm = turn.x * turn.x + turn.y * turn.y + turn.z * turn.z + turn.w * turn.w
-    if not (math.isfinite(shift.x + shift.y + shift.z) and abs(squared_norm - 1.0) < _SQUARED_NORM_ERROR):
-        shown = f"translation {shift.x} {shift.y} {shift.z}, quaternion {turn.x} {turn.y} {turn.z} {turn.w}"
-        raise RefusedInput(_KIND, f"{shown}, must be finite and of length 1")
 
 
 def _time(stamp_ns: int) -> genpy.Time:

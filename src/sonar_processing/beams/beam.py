@@ -16,8 +16,7 @@ FARTHEST_RANGE = 10_000.0
 _MOST_ANGLE = 1e6  # rad: more turns than any head counts; a broken message has up to 1e308
 SERVO_DEAD_BAND = 1e-3  # rad: a servo that holds its place trembles by less, and none steps by as little
 _ROUNDING = 1e-4  # Share: of a length of bins that was computed from float32
-_LONGEST_NS = 10 * 10**9
-"""Longer than any head takes for some beams, shorter than a slow turn: the vehicle is elsewhere by then."""
+_LONGEST_NS = 10 * 10**9  # Longer than any head takes for some beams, shorter than a slow turn
 
 
 @dataclass(frozen=True)
@@ -73,7 +72,7 @@ class PlacedBeam:
     is_moving: bool
 
     def turned(self, angle: float) -> "PlacedBeam":
-        """Return the beam of a sonar that is turned by `angle` [rad] more about the target frame's z, where it is."""
+        """Return the beam of a sonar that is turned by `angle` [rad] about the target frame's z, where it is."""
         T_turned = self.T_target_sonar.copy()
         T_turned[:3, :3] = pose_matrix((0.0, 0.0, 0.0), (0.0, 0.0, angle))[:3, :3] @ self.T_target_sonar[:3, :3]
         return replace(self, T_target_sonar=T_turned)
@@ -111,7 +110,8 @@ def project_beams(
     T_target_sonar is (n, 4, 4).
     """
     angles = np.array([beam.angle for beam in beams])
-    headings = angles[:, np.newaxis] + _offsets(dispersed_points, beam_width)
+    half_width = beam_width / 2.0 if dispersed_points > 1 else 0.0
+    headings = angles[:, np.newaxis] + np.linspace(-half_width, half_width, dispersed_points)
     poses, strengths = (
         np.repeat(values, dispersed_points, axis=0)
         for values in (T_target_sonar, np.stack([beam.intensities for beam in beams]))
@@ -142,9 +142,3 @@ def bin_points(origins: np.ndarray, directions: np.ndarray, ranges: np.ndarray, 
         points[..., axis] = along
     points[..., 3] = strengths
     return points
-
-
-def _offsets(count: int, beam_width: float) -> np.ndarray:
-    if count == 1:
-        return np.zeros(1)
-    return np.linspace(-beam_width / 2.0, beam_width / 2.0, count)

@@ -59,25 +59,16 @@ class BeamQueue:
         These are all that can be placed now; those older than one of the same frame that can, since tf knows nothing
         more of the past; and those that have waited too long. `obstacle` says why a beam cannot be placed, or "".
         """
-        entries = list(self._waiting)
-        newest = self._newest_placeable(entries, obstacle)
-        leaves = [index <= newest.get(entry.beam.frame_id, -1) for index, entry in enumerate(entries)]
-        self._waiting = deque(entry for entry, leave in zip(entries, leaves) if not leave)
-        departing = [entry for entry, leave in zip(entries, leaves) if leave]
-        while self._waiting and self._oldest_waited_too_long():
-            departing.append(self._waiting.popleft())
-        return [(entry, obstacle(entry.beam)) for entry in departing]
-
-    @staticmethod
-    def _newest_placeable(entries: List[WaitingBeam], obstacle: Callable[[Beam], str]) -> Dict[str, int]:
-        """Return the index of the newest beam of each frame that can be placed."""
-        found: Dict[str, int] = {}
+        stays: Deque[WaitingBeam] = deque()
+        departing: Deque[WaitingBeam] = deque()
+        placeable_frames = set()
         # From the newest back: what tf brings meanwhile can then only help the older ones.
-        for index in reversed(range(len(entries))):
-            beam = entries[index].beam
-            if beam.frame_id not in found and not obstacle(beam):
-                found[beam.frame_id] = index
-        return found
-
-    def _oldest_waited_too_long(self) -> bool:
-        return len(self._waiting) > self._most and self._clock() - self._waiting[0].since > PATIENCE
+        for entry in reversed(self._waiting):
+            frame = entry.beam.frame_id
+            if frame not in placeable_frames and not obstacle(entry.beam):
+                placeable_frames.add(frame)
+            (departing if frame in placeable_frames else stays).appendleft(entry)
+        self._waiting = stays
+        while len(stays) > self._most and self._clock() - stays[0].since > PATIENCE:
+            departing.append(stays.popleft())
+        return [(entry, obstacle(entry.beam)) for entry in departing]

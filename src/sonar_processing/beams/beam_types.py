@@ -33,8 +33,7 @@ OWN = "underwater_map_construction/SonarScanLine"
 LASER_SCAN = "sensor_msgs/LaserScan"
 POINT_CLOUD = "sensor_msgs/PointCloud"
 IMAGE = "sensor_msgs/Image"
-UNLIKELY = (IMAGE, LASER_SCAN)
-"""Types that hold beams of a scanning sonar where somebody says so, and else what cameras and rangefinders send."""
+UNLIKELY = (IMAGE, LASER_SCAN)  # beams of a scanning sonar where somebody says so, else of cameras and rangefinders
 _STRAIGHT = 0.01  # Of a bin: so far points of one beam lie beside their line, by rounding
 
 
@@ -62,8 +61,7 @@ class RadiansOrGradians:
 
     def __init__(self) -> None:
         self._votes: Deque[bool] = deque(maxlen=_VOTES)
-        self.unit: Optional[AngleUnit] = None
-        """None before any angle said something."""
+        self.unit: Optional[AngleUnit] = None  # before any angle said something
 
     def take(self, angle: float) -> None:
         """Take one more angle; one that is 0 or not finite says nothing."""
@@ -129,7 +127,9 @@ def laser_scan(message: Any) -> List[BeamFields]:
     one way are the bins of one beam, whose strengths are their intensities, as in the Girona caves data set.
     """
     if len(message.ranges) > 1 and message.angle_increment == 0.0:
-        return _bins_of_rays(message)
+        resolution = length_of_bins(message.ranges, len(message.intensities))
+        strengths = strengths_of(np.clip(message.intensities, 0, 255))
+        return [BeamFields.of(message, message.angle_min, strengths, resolution)]
     if not (message.range_max > 0.0 and np.isfinite([message.range_max, message.time_increment]).all()):
         given = f"range_max {message.range_max} m, time_increment {message.time_increment} s"
         raise RefusedInput("beams refused", f"{given}; must be finite, range_max above 0")
@@ -143,13 +143,6 @@ def laser_scan(message: Any) -> List[BeamFields]:
         BeamFields(stamp, message.header.frame_id, float(angle), _echo_at(distance / resolution), resolution)
         for stamp, angle, distance in zip(stamps, angles, ranges)
     ]
-
-
-def _bins_of_rays(message: Any) -> List[BeamFields]:
-    """Return the beam whose bins the rays of a LaserScan are; raises RefusedInput for rays that are none."""
-    resolution = length_of_bins(message.ranges, len(message.intensities))
-    strengths = strengths_of(np.clip(message.intensities, 0, 255))
-    return [BeamFields.of(message, message.angle_min, strengths, resolution)]
 
 
 def _echo_at(index: float) -> np.ndarray:
@@ -178,10 +171,6 @@ class BeamType:
     ahead: float = 0.0
     stamped_after_reply: bool = True
     advice: str = ""
-
-    @property
-    def name(self) -> str:
-        return self.names[0]
 
     def reader(self, image_range: float) -> Callable[[Any], List[BeamFields]]:
         """Return what takes the fields of the messages of one topic. image_range: m, of images."""

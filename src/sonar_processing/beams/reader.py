@@ -108,7 +108,7 @@ class BeamReader:
             return AngleUnit(self._parameters.angle_unit.value)
         if not kind.may_be_gradians:
             return kind.unit
-        guess = self._guesses.setdefault(kind.name, RadiansOrGradians())
+        guess = self._guesses.setdefault(kind.names[0], RadiansOrGradians())
         for one in found:
             guess.take(one.angle)
         return guess.unit
@@ -118,20 +118,16 @@ class BeamReader:
         # Drivers of ROS 1's first years name frames "/sonar"; tf2 knows them without the slash.
         frame_id = found.frame_id.lstrip("/")
         check_frame(frame_id, _REFUSED)
+        angle = unit.to_radians(found.angle) - kind.unit.to_radians(kind.ahead)
         beam = Beam(
             stamp_ns=found.stamp_ns,
             frame_id=frame_id,
-            angle=self._angle(found.angle, kind, unit),
+            angle=-angle if self._is_clockwise(kind) else angle,
             intensities=found.intensities,
             range_resolution=found.range_resolution,
             sensor_angle=found.sensor_angle,
         )
         return replace(beam, stamp_ns=beam.stamp_ns - found.travel_time_ns) if kind.stamped_after_reply else beam
-
-    def _angle(self, angle: float, kind: BeamType, unit: AngleUnit) -> float:
-        """Return the angle from +x about +z of the frame, rad."""
-        turned = unit.to_radians(angle) - kind.unit.to_radians(kind.ahead)
-        return -turned if self._is_clockwise(kind) else turned
 
     def _is_clockwise(self, kind: BeamType) -> bool:
         if self._parameters.head_turns is HeadTurns.TYPE:
@@ -139,7 +135,7 @@ class BeamReader:
         return self._parameters.head_turns is HeadTurns.CLOCKWISE
 
     def _notes(self, kind: BeamType, type_name: str, unit: AngleUnit, changed: bool) -> List[str]:
-        if kind.name == OWN or (type_name in self._described and not changed):
+        if OWN in kind.names or (type_name in self._described and not changed):
             return []
         self._described.add(type_name)
         is_told = self._parameters.angle_unit is AngleUnitChoice.TYPE and unit is not kind.unit

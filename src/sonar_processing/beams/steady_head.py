@@ -4,7 +4,7 @@ back and goes on. Such angles are replaced by those of the turn.
 
 from collections import deque
 from dataclasses import replace
-from typing import Deque, Iterator, List, NamedTuple, Optional, Sequence
+from typing import Deque, List, NamedTuple, Optional, Sequence
 
 import numpy as np
 
@@ -45,8 +45,9 @@ def _turning(reported: Sequence[float]) -> Turning:
     return Turning(line, deviation, is_steady, is_steady and back >= _BACK * float(np.median(np.abs(steps))))
 
 
-def _reverses(before: float, angle: float, after: float) -> bool:
-    """Return whether a head turned back between two beams: only there angles need to be looked at."""
+def _reverses(window: Sequence[float]) -> bool:
+    """Return whether a head turned back at the middle of a window: only there angles need to be looked at."""
+    before, angle, after = window[_SIDE - 1], window[_SIDE], window[_SIDE + 1]
     return wrapped(angle - before) * wrapped(after - angle) < 0.0
 
 
@@ -92,7 +93,7 @@ class SteadyHead:
         return float(np.median(self._deviations)) if self._deviations else 0.0
 
     def _look(self) -> Optional[Turning]:
-        if len(self._window) < _WINDOW or not (self.trembles or _reverses(*_middle(self._window))):
+        if len(self._window) < _WINDOW or not (self.trembles or _reverses(self._window)):
             return None
         turning = _turning(self._window)
         if turning.goes_back:
@@ -115,28 +116,17 @@ class Steadied(NamedTuple):
 def steadied(beams: Sequence[Beam]) -> Optional[Steadied]:
     """Return the beams of a recording, in the order of their stamps, if their angles tremble; None where not."""
     angles = np.array([beam.angle for beam in beams])
-    back = [turning for turning in _turned_back(angles) if turning.goes_back]
+    windows = [angles[first : first + _WINDOW] for first in range(len(angles) - _WINDOW + 1)]
+    back = [turning for turning in map(_turning, filter(_reverses, windows)) if turning.goes_back]
     if len(back) < max(_FEWEST, _FEWEST * len(beams) / _AMONG):
         return None
     found, steady = [], 0
     for number, beam in enumerate(beams):
         first = min(max(number - _SIDE, 0), len(beams) - _WINDOW)
-        turning = _turning(angles[first : first + _WINDOW])
+        turning = _turning(windows[first])
         found.append(_on(turning, beam, number - first))
         steady += turning.is_steady
     return Steadied(found, float(np.median([turning.deviation for turning in back])), steady / len(beams))
-
-
-def _turned_back(angles: np.ndarray) -> Iterator[Turning]:
-    """Yield how a head turned about each beam where it turned back; angles: (n,) rad."""
-    for first in range(len(angles) - _WINDOW + 1):
-        window = angles[first : first + _WINDOW]
-        if _reverses(*_middle(window)):
-            yield _turning(window)
-
-
-def _middle(window: Sequence[float]) -> Sequence[float]:
-    return window[_SIDE - 1], window[_SIDE], window[_SIDE + 1]
 
 
 def _on(turning: Turning, beam: Beam, number: int) -> Beam:

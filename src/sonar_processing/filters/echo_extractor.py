@@ -16,14 +16,7 @@ from scipy.ndimage import gaussian_filter1d, median_filter, uniform_filter1d
 from node_support.errors import RefusedInput
 from node_support.parameters import ParameterSet, parameter
 from sonar_processing.cloud import Cloud
-from sonar_processing.filters.echo_peaks import (
-    EchoShape,
-    EchoStatistics,
-    Peaks,
-    find_peaks,
-    leading_edges,
-    points_along_runs,
-)
+from sonar_processing.filters.echo_peaks import EchoStatistics, Peaks, find_peaks, leading_edges, points_along_runs
 from sonar_processing.filters.threshold import height_threshold
 
 FEWEST_BEAMS = 6  # Fewer directions tell no quantile over them
@@ -89,8 +82,7 @@ class EchoExtractorParameters(ParameterSet):
         """Return them with what is left open taken from the echoes that were heard."""
         mode, sigma = self.mode, self.pulse_sigma
         if mode is ExtractionMode.AUTO:
-            is_plateau = heard.shape is EchoShape.PLATEAU
-            mode = ExtractionMode.DENSE if is_plateau else ExtractionMode.MATCHED_FILTER
+            mode = ExtractionMode.DENSE if heard.are_plateaus else ExtractionMode.MATCHED_FILTER
         if not sigma:
             sigma = _EDGE_SIGMA if mode is ExtractionMode.DENSE else round(heard.sigma, 3)
         return replace(self, mode=mode, pulse_sigma=sigma)
@@ -108,8 +100,9 @@ def extract_echoes(
     """
     is_dense = parameters.mode is ExtractionMode.DENSE
     sigma = max(parameters.pulse_sigma / range_resolution, _SMALLEST_SIGMA_BINS)
-    first_bin = max(_bins_above(parameters.min_range / range_resolution - 0.5), 0)
-    smooth = matched_filter(strengths, sigma, first_bin)
+    heard = strengths.astype(np.float32)
+    heard[:, : max(_bins_above(parameters.min_range / range_resolution - 0.5), 0)] = 0.0
+    smooth = gaussian_filter1d(heard, sigma, axis=1, mode="constant")
     ring, spread = ring_of(smooth if is_dense else _hearing(smooth), parameters.ring_quantile, sigma)
     if is_narrow:
         around = 2 * (_bins_above(_PROFILE / range_resolution) // 2) + 1
@@ -126,16 +119,6 @@ def extract_echoes(
     elif is_dense:
         peaks = points_along_runs(response, threshold, parameters.spacing / range_resolution)
     return peaks, threshold
-
-
-def matched_filter(strengths: np.ndarray, sigma: float, first_bin: int = 0) -> np.ndarray:
-    """Return (beams, bins) float32: strengths through a Gaussian of `sigma` bins along range.
-
-    Beyond the first and the last bin nothing is heard, and neither before `first_bin`.
-    """
-    heard = strengths.astype(np.float32)
-    heard[:, :first_bin] = 0.0
-    return gaussian_filter1d(heard, sigma, axis=1, mode="constant")
 
 
 def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarray, np.ndarray]:
@@ -181,10 +164,8 @@ class EchoExtractor:
 
     def __init__(self, parameters: EchoExtractorParameters) -> None:
         self.parameters = parameters
-        self.newest_parameters = parameters
-        """Those of the newest scan, with what was found out."""
-        self.newest_threshold: Optional[float] = None
-        """The height that parted echoes from speckle in the newest scan."""
+        self.newest_parameters = parameters  # of the newest scan, with what was found out
+        self.newest_threshold: Optional[float] = None  # the height that parted its echoes from speckle
         self._heard: Optional[EchoStatistics] = None
         self._newest_ns = 0
 
@@ -211,12 +192,9 @@ class EchoExtractor:
 
     def _heard_with(self, strengths: np.ndarray, resolution: float, stamp_ns: int) -> EchoStatistics:
         """Return what was heard since the bins changed or time jumped, the scan included."""
-        if (
-            self._heard is None
-            or stamp_ns < self._newest_ns
-            or not self._heard.has_bins(strengths.shape[1], resolution)
-        ):
-            self._heard = EchoStatistics(strengths.shape[1], resolution)
+        bins, heard = strengths.shape[1], self._heard
+        if heard is None or stamp_ns < self._newest_ns or not heard.has_bins(bins, resolution):
+            self._heard = EchoStatistics(bins, resolution)
         self._newest_ns = stamp_ns
         self._heard.add(strengths)
         return self._heard

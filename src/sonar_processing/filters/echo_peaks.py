@@ -2,7 +2,6 @@
 
 import math
 from dataclasses import dataclass, replace
-from enum import Enum
 from typing import Tuple
 
 import numpy as np
@@ -17,17 +16,6 @@ _LEVEL = 0.75  # of the autocorrelation: high on its flank, where slanting walls
 _LEAST, _MOST = 0.15, 2.0  # m: a pulse of 0.2 ms, and a wall that a wide beam meets aslant
 _FEWEST_BINS = 4
 _SAME_LENGTH = 1e-3  # share by which the length of a bin may differ: places in float32 round it
-
-
-class EchoShape(Enum):
-    """What an echo looks like along a beam.
-
-    PEAK: strengths differ; an echo has a peak, and noise has no sharp edge. PLATEAU: strengths only say "something" or
-    "nothing"; an echo is metres long, its middle means nothing, and the surface is where it begins.
-    """
-
-    PEAK = "PEAK"
-    PLATEAU = "PLATEAU"
 
 
 class EchoStatistics:
@@ -51,10 +39,12 @@ class EchoStatistics:
         self._as_strong += int(np.count_nonzero(is_heard & (strengths >= _AS_STRONG * strengths.max(initial=0))))
 
     @property
-    def shape(self) -> EchoShape:
-        """PLATEAU where nearly all echoes are as strong as any, else PEAK."""
-        is_plateau = self._heard > 0 and self._as_strong >= _ONE_STRENGTH * self._heard
-        return EchoShape.PLATEAU if is_plateau else EchoShape.PEAK
+    def are_plateaus(self) -> bool:
+        """Whether nearly all echoes are as strong as any: strengths only say "something" or "nothing".
+
+        Such an echo is metres long, its middle means nothing, and the surface is where it begins.
+        """
+        return self._heard > 0 and self._as_strong >= _ONE_STRENGTH * self._heard
 
     @property
     def sigma(self) -> float:
@@ -86,9 +76,8 @@ def _falls_below(values: np.ndarray, level: float) -> float:
     below = np.flatnonzero(values[1:] < level)
     if not len(below):
         return float(len(values))
-    after = int(below[0]) + 1
-    before = after - 1
-    share = (values[before] - level) / (values[before] - values[after])
+    before = int(below[0])
+    share = (values[before] - level) / (values[before] - values[before + 1])
     return before + float(np.clip(share, 0.0, 1.0))
 
 

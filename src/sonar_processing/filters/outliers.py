@@ -95,12 +95,7 @@ def radius_inliers(points: np.ndarray, radius: float, min_neighbors: int) -> np.
     unsure = np.flatnonzero(~surely)
     possibly = tree.query_ball_point(points[unsure], radius + slack, return_length=True) > min_neighbors
     for index in unsure[possibly]:
-        near = points[tree.query_ball_point(points[index], radius + slack)]
-        surely[index] = np.count_nonzero(_squared_distances(near, points[index]) <= radius * radius) > min_neighbors
+        squares = (points[tree.query_ball_point(points[index], radius + slack)] - points[index]) ** 2
+        squared_distances = ((squares[:, 0] + squares[:, 1]) + squares[:, 2]).astype(np.float64)
+        surely[index] = np.count_nonzero(squared_distances <= radius * radius) > min_neighbors
     return surely
-
-
-def _squared_distances(points: np.ndarray, center: np.ndarray) -> np.ndarray:
-    difference = points - center
-    squares = difference * difference
-    return ((squares[:, 0] + squares[:, 1]) + squares[:, 2]).astype(np.float64)

@@ -53,8 +53,7 @@ class Thresholder:
         from sonar_processing.filters import compiled_strengths
 
         self._loops = compiled_strengths
-        self.newest_threshold: Optional[float] = None
-        """The threshold of the newest cloud; None before the first and for a cloud without a finite point."""
+        self.newest_threshold: Optional[float] = None  # before the first cloud and for one without a finite point
 
     def __call__(self, cloud: Cloud) -> Cloud:
         """Return the cloud's strong points; a cloud without a finite point comes back without points.
@@ -83,16 +82,15 @@ class Thresholder:
             value = parameters.fixed_threshold
         elif parameters.mode is ThresholdMode.PROPORTIONAL:
             value = parameters.max_proportion * highest + parameters.min_proportion * lowest
-        else:
+        elif weakest < highest:
+            levels, silent = counts[:-1].copy(), counts[-1]
+            if not parameters.otsu_nonzero:
+                levels[0] += silent
             factor = 1.0 if parameters.mode is ThresholdMode.OTSU else parameters.otsu_multiplier
-            value = factor * self._otsu(counts) if weakest < highest else 0.0
+            value = factor * self._loops.threshold_of_levels(levels)
+        else:
+            value = 0.0
         return max(value, parameters.min_threshold)
-
-    def _otsu(self, counts: np.ndarray) -> float:
-        levels, silent = counts[:-1].copy(), counts[-1]
-        if not self.parameters.otsu_nonzero:
-            levels[0] += silent
-        return self._loops.threshold_of_levels(levels)
 
 
 def otsu_threshold(strengths: np.ndarray) -> float:

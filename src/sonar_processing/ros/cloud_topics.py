@@ -108,11 +108,7 @@ class SonarPlaces:
     def __init__(self, sonar_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frame = sonar_frame
-        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance)
-
-    def check_stamp(self, stamp_ns: int) -> None:
-        """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
-        self._transforms.check_stamp(stamp_ns)
+        self.transforms = TfBuffer(health, _CACHE, stamp_tolerance)
 
     def poses(self, frame_id: str, times: np.ndarray) -> np.ndarray:
         """Return T_frame_sonar (m, 4, 4) in `frame_id` at `times` (m,) [s], NaN where tf does not know it.
@@ -121,7 +117,7 @@ class SonarPlaces:
         """
         distinct, index = np.unique(times, return_inverse=True)
         stamps = [stamp_of(seconds) for seconds in distinct]
-        reason = self._transforms.wait_for(frame_id, self._frame, stamps[-1], _PATIENCE)
+        reason = self.transforms.wait_for(frame_id, self._frame, stamps[-1], _PATIENCE)
         poses = np.array([self._pose(frame_id, stamp) for stamp in stamps])
         if np.isnan(poses).all():
             raise RefusedInput("scans without sonar position", f"{self._frame} in {frame_id}: {reason}")
@@ -133,6 +129,6 @@ class SonarPlaces:
 
     def _pose(self, frame_id: str, stamp_ns: int) -> np.ndarray:
         try:
-            return self._transforms.matrix(frame_id, self._frame, stamp_ns)
+            return self.transforms.matrix(frame_id, self._frame, stamp_ns)
         except RefusedInput:
             return np.full((4, 4), np.nan)

@@ -30,25 +30,21 @@ def header(stamp_ns: int, frame_id: str) -> Header:
     return Header(stamp=genpy.Time(*divmod(int(stamp_ns), 10**9)), frame_id=frame_id)
 
 
-def check_header(head: Header, kind: str) -> None:
-    """Raise RefusedInput, a bad frame counted as `kind`, for a header whose stamp or frame nobody can use."""
-    check_frame(head.frame_id, kind)
-    check_stamp(head.stamp.to_nsec())
-
-
 def cloud_from_message(message: StampedIntensityCloud) -> Cloud:
     """Return the cloud of a StampedIntensityCloud; raises RefusedInput for one that cannot be used.
 
     A cloud of one row that says it may hold points that are not finite is organised: a single beam.
     """
-    check_header(message.header, "clouds refused")
+    stamp_ns, frame_id = message.header.stamp.to_nsec(), message.header.frame_id
+    check_frame(frame_id, "clouds refused")
+    check_stamp(stamp_ns)
     time_stamps = np.asarray(message.timeStamps, dtype=np.float64)
-    check_point_stamps(time_stamps, message.header.stamp.to_nsec())
+    check_point_stamps(time_stamps, stamp_ns)
     return Cloud(
         points=points_from_message(message.cloud),
         time_stamps=time_stamps,
-        stamp_ns=message.header.stamp.to_nsec(),
-        frame_id=message.header.frame_id,
+        stamp_ns=stamp_ns,
+        frame_id=frame_id,
         height=max(message.cloud.height, 1),
         organized=not message.cloud.is_dense,
     )

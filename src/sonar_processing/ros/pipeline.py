@@ -16,7 +16,7 @@ from node_support.ros.callbacks import make_health
 from node_support.ros.node import run
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters, kept_by_master
 from sonar_processing.beams.beam import Beam
-from sonar_processing.cloud import Cloud, CloudSink
+from sonar_processing.cloud import NOBODY, Cloud, CloudSink
 from sonar_processing.filters.stage_table import SCANS_IN_A_ROW, STAGES, EmptiedScans
 from sonar_processing.ros.cloud_topics import (
     CloudPublisher,
@@ -72,18 +72,15 @@ class StageRunner:
             self.health.problem(refused.kind, str(refused))
             return None
         report_broken(cloud, self.health)
-        self._count_out(cloud, result)
-        self._publishers[topic].publish(result)
-        for figure in self._figures:
-            figure.publish(self.type.figures[figure.name](stage))
-        return result
-
-    def _count_out(self, cloud: Cloud, result: Cloud) -> None:
         points = int(np.count_nonzero(result.valid))
         self.health.count("clouds out")
         self.health.count("points out", points)
         if self._emptied.take(int(np.count_nonzero(cloud.valid)), points):
             self.health.problem("scans in a row lost all points", self.type.when_empty, SCANS_IN_A_ROW)
+        self._publishers[topic].publish(result)
+        for figure in self._figures:
+            figure.publish(self.type.figures[figure.name](stage))
+        return result
 
 
 def run_stage(name: str) -> None:
@@ -129,14 +126,12 @@ class Pipeline:
     """
 
     def __init__(
-        self, cloud_sink: Optional[CloudSink] = None, echo_sink: Optional[CloudSink] = None,
+        self, cloud_sink: CloudSink = NOBODY, echo_sink: CloudSink = NOBODY,
         beam_sink: Callable[[Beam], None] = lambda _: None,
     ) -> None:  # fmt: skip
         """`cloud_sink` receives what leaves the last stage of clouds, `echo_sink` the last of polar scans.
 
-        `beam_sink` receives each beam.
-
-        Raises ParameterError for a bad parameter of any stage or detector.
+        `beam_sink` receives each beam. Raises ParameterError for a bad parameter of any stage or detector.
         """
         _refuse_other_names()
         runners = [StageRunner(name, rospy.resolve_name(name)) for name in _names("chain", DEFAULT_CHAIN, STAGES)]
@@ -154,9 +149,7 @@ class Pipeline:
             beam_sink,
         )
         self._image = SonarImage(rospy.resolve_name("sonar_image"))
-        hosted = [self._source, *runners, *detectors, self._image]
-        self.healths: List[Health] = [one.health for one in hosted]
-        """The health of everything that is hosted."""
+        self.healths: List[Health] = [one.health for one in (self._source, *runners, *detectors, self._image)]
 
 
 def _detectors(made: Collection[str]) -> List["ShapeDetectorNode"]:
@@ -191,10 +184,10 @@ def _names(parameter: str, default: List[str], known: Collection[str]) -> List[s
 
 
 def _stage_chain(
-    links: Sequence[Tuple[StageRunner, str]], sinks: Dict[str, List[CloudSink]], last: Optional[CloudSink]
+    links: Sequence[Tuple[StageRunner, str]], sinks: Dict[str, List[CloudSink]], last: CloudSink
 ) -> StageChain:
     """Return a chain that gives what the last stage makes to `last` too."""
-    if links and last is not None:
+    if links:
         runner, topic = links[-1]
         sinks[runner.type.outputs[topic]].append(last)
     return StageChain(links, sinks)

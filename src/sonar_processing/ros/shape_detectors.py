@@ -34,6 +34,7 @@ class ShapeDetectorNode(ABC):
     topic: str
     what: str
     parameters: type
+    detector: type
     message: type
 
     def __init__(self, namespace: str = "~") -> None:
@@ -63,9 +64,8 @@ class ShapeDetectorNode(ABC):
         publishers = (self._coefficients, self._markers)
         return self._inliers.is_read or any(publisher.get_num_connections() for publisher in publishers)
 
-    @abstractmethod
     def _use_parameters(self, parameters: RansacParameters) -> None:
-        """Make the detector anew."""
+        self._detector = self.detector(parameters)
 
     @abstractmethod
     def _detect(self, cloud: Cloud) -> Tuple[Sequence[Any], Any, MarkerArray]:
@@ -76,7 +76,7 @@ class ShapeDetectorNode(ABC):
         self.health.count("clouds in")
         self.health.count("points in", len(cloud))
         report_broken(cloud, self.health)
-        self._places.check_stamp(cloud.stamp_ns)
+        self._places.transforms.check_stamp(cloud.stamp_ns)
         with self.health.timed():
             shapes, coefficients, markers = self._detect(cloud)
         self.health.count(f"{self.what} out", len(shapes))
@@ -90,10 +90,7 @@ class LineDetectorNode(ShapeDetectorNode):
 
     name, input_topic, topic = "line_detector", topics.CLEANED, topics.LINES
     what = "walls"
-    parameters, message = LineDetectorParameters, Walls
-
-    def _use_parameters(self, parameters: LineDetectorParameters) -> None:
-        self._detector = LineDetector(parameters)
+    parameters, detector, message = LineDetectorParameters, LineDetector, Walls
 
     def _detect(self, cloud: Cloud) -> Tuple[Sequence[Any], Walls, MarkerArray]:
         lines = self._detector(cloud)
@@ -113,10 +110,7 @@ class CircleDetectorNode(ShapeDetectorNode):
 
     name, input_topic, topic = "circle_detector", topics.THRESHOLDED, topics.CIRCLES
     what = "circles"
-    parameters, message = CircleDetectorParameters, Circles
-
-    def _use_parameters(self, parameters: CircleDetectorParameters) -> None:
-        self._detector = CircleDetector(parameters)
+    parameters, detector, message = CircleDetectorParameters, CircleDetector, Circles
 
     def _detect(self, cloud: Cloud) -> Tuple[Sequence[Any], Circles, MarkerArray]:
         circles = self._detector(cloud, lambda times: self._places.at(cloud.frame_id, times))
@@ -126,9 +120,7 @@ class CircleDetectorNode(ShapeDetectorNode):
 
 def _part(cloud: Cloud, shapes: Sequence[Any]) -> Cloud:
     members = np.concatenate([np.zeros(0, dtype=np.int64), *(shape.members for shape in shapes)])
-    keep = np.zeros(len(cloud), dtype=bool)
-    keep[members] = True
-    return cloud.select(keep)
+    return cloud.take(np.unique(members))
 
 
 DETECTORS = {kind.name: kind for kind in (LineDetectorNode, CircleDetectorNode)}
@@ -140,7 +132,7 @@ class DetectorQueue:
     def __init__(self, detector: ShapeDetectorNode) -> None:
         self._health = detector.health
         self._process: Callable[[Cloud], None] = guarded(detector.health, detector.process)
-        self._clouds: Deque[Cloud] = deque()
+        self._clouds: Deque[Cloud] = deque(maxlen=_WAITING)
         self._condition = threading.Condition()
         threading.Thread(target=self._work, daemon=True).start()
 
@@ -148,7 +140,6 @@ class DetectorQueue:
         """Queue a cloud; returns at once. The oldest one that waits goes when there are too many."""
         with self._condition:
             if len(self._clouds) == _WAITING:
-                self._clouds.popleft()
                 self._health.problem("clouds dropped", f"{_WAITING} newer ones wait, the machine is too slow")
             self._clouds.append(cloud)
             self._condition.notify()

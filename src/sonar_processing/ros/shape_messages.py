@@ -26,15 +26,13 @@ _LEAST_HEIGHT = 0.5  # m: a circle is drawn as a flat disc, since its height is 
 
 def walls_message(cloud: Cloud, lines: Sequence[Line], sonar: np.ndarray) -> msg.Walls:
     """Return the walls of a scan; `sonar` (2,) x y [m] in the cloud's frame, NaN when unknown."""
-    message = msg.Walls(header=header(cloud.stamp_ns, cloud.frame_id))
-    message.walls = [_wall(cloud, line, sonar) for line in lines]
-    return message
+    walls = [_wall(cloud, line, sonar) for line in lines]
+    return msg.Walls(header=header(cloud.stamp_ns, cloud.frame_id), walls=walls)
 
 
 def circles_message(cloud: Cloud, circles: Sequence[Circle]) -> msg.Circles:
-    message = msg.Circles(header=header(cloud.stamp_ns, cloud.frame_id))
-    message.circles = [_circle(cloud, circle) for circle in circles]
-    return message
+    found = [_circle(cloud, circle) for circle in circles]
+    return msg.Circles(header=header(cloud.stamp_ns, cloud.frame_id), circles=found)
 
 
 def wall_markers(message: msg.Walls) -> MarkerArray:
@@ -42,7 +40,7 @@ def wall_markers(message: msg.Walls) -> MarkerArray:
 
     A distance whose text would lie on an earlier one is left out.
     """
-    markers = [_cleared(message.header)]
+    markers = [Marker(header=message.header, action=Marker.DELETEALL)]
     height, labelled = _text_height(message.walls), []
     for number, wall in enumerate(message.walls):
         line = _marker(message.header, "walls", number, Marker.LINE_STRIP, WALL_COLOR)
@@ -58,7 +56,7 @@ def wall_markers(message: msg.Walls) -> MarkerArray:
 
 
 def circle_markers(message: msg.Circles) -> MarkerArray:
-    markers = [_cleared(message.header)]
+    markers = [Marker(header=message.header, action=Marker.DELETEALL)]
     for number, circle in enumerate(message.circles):
         cylinder = _marker(message.header, "circles", number, Marker.CYLINDER, CIRCLE_COLOR)
         cylinder.pose.position = circle.center
@@ -97,10 +95,6 @@ def _middle_height(cloud: Cloud, members: np.ndarray) -> float:
 
 def _array(point: Point) -> np.ndarray:
     return np.array([point.x, point.y, point.z])
-
-
-def _cleared(head: Header) -> Marker:
-    return Marker(header=head, action=Marker.DELETEALL)
 
 
 def _marker(head: Header, namespace: str, number: int, kind: int, color: ColorRGBA) -> Marker:

@@ -1,6 +1,6 @@
 """The ROS side of sonar_to_cloud: beams, tf and the velocity in, scans out (thesis 4.5.1, 6.5.2)."""
 
-from typing import Any, Callable, Dict, List, Optional, Tuple
+from typing import Any, Callable, Dict, List, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist, TwistStamped, Vector3
@@ -13,7 +13,7 @@ from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.head import HeadWatch
-from sonar_processing.cloud import Cloud, CloudSink
+from sonar_processing.cloud import NOBODY, Cloud, CloudSink
 from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.cloud_topics import QUEUE_SIZE, CloudPublisher, PointsPublisher
 from sonar_processing.ros.conversions import LaserScanArrays, laser_scan_message, point_cloud
@@ -32,7 +32,7 @@ _VELOCITY_KINDS: Dict[VelocityType, Tuple[type, Callable[[Any], Twist]]] = {
 class RevolutionPublisher:
     """The revolution as organised cloud, as LaserScan and as cloud with times; `sink` gets the organised cloud."""
 
-    def __init__(self, health: Health, sink: Optional[CloudSink] = None) -> None:
+    def __init__(self, health: Health, sink: CloudSink) -> None:
         self._health = health
         self._sink = sink
         self._clouds = CloudPublisher(topics.POLAR_SCANS)
@@ -48,20 +48,19 @@ class RevolutionPublisher:
         if self._turns.get_num_connections():
             points = turn_cloud(scan, parameters)
             self._turns.publish(point_cloud(points, scan.stamp_ns, scan.sonar_frame, fields=TURN_FIELDS))
-        is_taken = self._sink is not None and self._sink.is_wanted()
-        if not (is_taken or self._clouds.is_read):
-            return
-        cloud = scan.cloud(parameters)
-        self._clouds.publish(cloud)
-        if is_taken:
-            self._sink.take(cloud)
+        is_taken = self._sink.is_wanted()
+        if is_taken or self._clouds.is_read:
+            cloud = scan.cloud(parameters)
+            self._clouds.publish(cloud)
+            if is_taken:
+                self._sink.take(cloud)
 
 
 class SonarToCloud:
     """Subscribes to beams, publishes scans and hands them on where stages share the process."""
 
     def __init__(
-        self, namespace: str = "~", scan_sink: Optional[CloudSink] = None, polar_sink: Optional[CloudSink] = None,
+        self, namespace: str = "~", scan_sink: CloudSink = NOBODY, polar_sink: CloudSink = NOBODY,
         beam_sink: Callable[[Beam], None] = lambda _: None,
     ) -> None:  # fmt: skip
         """`scan_sink` takes scans, `polar_sink` organised clouds of whole revolutions, `beam_sink` each beam.
@@ -84,7 +83,9 @@ class SonarToCloud:
         self._filter = TransformFilter(
             parameters.target_frame, self.health, self._place, self._forget_scan, parameters.stamp_tolerance, mount
         )
-        subscribe_to_velocity(parameters.velocity_topic, parameters.velocity_type, self._moving_state, self.health)
+        kind, self._twist_of = _VELOCITY_KINDS[parameters.velocity_type]
+        take = guarded(self.health, self._take_velocity)
+        rospy.Subscriber(parameters.velocity_topic, kind, take, queue_size=QUEUE_SIZE)
         self.health.expect(rospy.resolve_name(topics.BEAMS))
         BeamSubscriber(self._take_beam, parameters, self.health, self._filter.forget, self._filter.make_room)
 
@@ -94,6 +95,11 @@ class SonarToCloud:
     def _forget_scan(self) -> None:
         self._assembler.clear()
         self._revolution.clear()
+
+    def _take_velocity(self, message: Any) -> None:
+        self.health.count("velocities in")
+        twist = self._twist_of(message)
+        self._moving_state.take(_components(twist.linear), _components(twist.angular))
 
     def _take_beam(self, beam: Beam) -> None:
         self.health.count("points in", beam.intensities.size)
@@ -134,20 +140,7 @@ class SonarToCloud:
         self._scans.publish(scan)
         if self._live.current.mode.is_laser:
             self._laser_scans.publish(scan)
-        if self._scan_sink is not None:
-            self._scan_sink.take(scan)
-
-
-def subscribe_to_velocity(topic: str, kind: VelocityType, state: MovingState, health: Health) -> rospy.Subscriber:
-    """Keep `state` informed of the velocities on `topic`."""
-    message_type, twist_of = _VELOCITY_KINDS[kind]
-
-    def take(message: Any) -> None:
-        health.count("velocities in")
-        twist = twist_of(message)
-        state.take(_components(twist.linear), _components(twist.angular))
-
-    return rospy.Subscriber(topic, message_type, guarded(health, take), queue_size=QUEUE_SIZE)
+        self._scan_sink.take(scan)
 
 
 def _components(vector: Vector3) -> Tuple[float, float, float]:

@@ -44,34 +44,27 @@ class SonarMount:
 
     def look_at(self, waiting: Dict[str, int], transforms: TfBuffer) -> None:
         """Mount a frame of which many beams have been waiting for a while. waiting: beams by frame."""
-        if not self.is_wanted:
-            return
         now = time.monotonic()
         for frame, beams in waiting.items():
             if beams < _FEWEST or transforms.knows(frame):
                 self._missing_since.pop(frame, None)
             elif now - self._missing_since.setdefault(frame, now) >= _PATIENCE:
                 self._mount(frame)
-                return
+                break
 
     def _mount(self, frame: str) -> None:
-        self._broadcaster = tf2_ros.StaticTransformBroadcaster()
-        self._broadcaster.sendTransform(_transform(self._parameters, frame))
         one = self._parameters
+        pose, mount = one.matrix(), TransformStamped(child_frame_id=frame)
+        mount.header.frame_id = one.mounted_in
+        mount.transform.translation = Vector3(*pose[:3, 3])
+        mount.transform.rotation = Quaternion(*quaternion_of(pose))
+        self._broadcaster = tf2_ros.StaticTransformBroadcaster()
+        self._broadcaster.sendTransform(mount)
         rospy.logwarn(
             "%s: tf does not know %s: it is mounted in %s at %g %g %g m, yaw %g rad%s, as mount_* say",
             self._name, frame, one.mounted_in, one.mount_x, one.mount_y, one.mount_z, one.mount_yaw,
             ", upside down" if one.upside_down else "",
         )  # fmt: skip
-
-
-def _transform(parameters: MountingParameters, frame: str) -> TransformStamped:
-    pose = parameters.matrix()
-    made = TransformStamped(child_frame_id=frame)
-    made.header.frame_id = parameters.mounted_in
-    made.transform.translation = Vector3(*pose[:3, 3])
-    made.transform.rotation = Quaternion(*quaternion_of(pose))
-    return made
 
 
 class TransformFilter:

@@ -55,36 +55,35 @@ class ScanAssembler:
         continuous modes every beam returns the newest `scan_size` beams, once there are as many. An unfinished scan
         before a long silence of the head is forgotten: it would come long after its time.
         """
-        if self._last is not None and long_after(placed.beam, self._last):
+        beam, finished = placed.beam, None
+        if self._last is not None and long_after(beam, self._last):
             self.clear()
-        finished = self._finish() if self._begins_a_scan(placed.beam) else None
-        self._last = placed.beam
-        self._turn.add(placed.beam.angle)
+        elif self._last is not None and (
+            servo_moved(beam, self._last) or (self._ends_at_turn and self._turn.would_pass_start(beam.angle))
+        ):
+            finished = self._finish()
+        self._last = beam
+        self._turn.add(beam.angle)
         if self.parameters.mode.is_continuous:
             self._newest.append(self._projected([placed]))
             full = len(self._newest) == self.parameters.scan_size
-            return self._cloud(list(self._newest), placed.beam) if full else None
+            return self._cloud(list(self._newest), beam) if full else None
         self._beams.append(placed)
         is_complete = len(self._beams) >= self.parameters.scan_size or (self._ends_at_turn and self._turn.is_full)
         return self._finish() if finished is None and is_complete else finished
-
-    def _begins_a_scan(self, beam: Beam) -> bool:
-        if self._last is None:
-            return False
-        return servo_moved(beam, self._last) or (self._ends_at_turn and self._turn.would_pass_start(beam.angle))
 
     @property
     def _ends_at_turn(self) -> bool:
         return self.parameters.end_at_full_turn and not self.parameters.mode.is_continuous
 
     def _finish(self) -> Optional[Cloud]:
-        beams, last = list(self._beams), self._last
+        beams = list(self._beams)
         self.clear()
-        if not beams or last is None or self.parameters.mode.is_continuous:
+        if not beams:
             return None
         # All at once, for a beam alone takes five times as long; a head seldom changes its range within a scan.
         alike = groupby(beams, lambda placed: (placed.beam.intensities.size, placed.beam.range_resolution))
-        return self._cloud([self._projected(list(group)) for _, group in alike], last)
+        return self._cloud([self._projected(list(group)) for _, group in alike], beams[-1].beam)
 
     def _projected(self, placed: List[PlacedBeam]) -> _Projected:
         parameters, ranges = self.parameters, placed[0].beam.ranges
@@ -120,7 +119,6 @@ class RevolutionCollector:
         self._turn = HeadTurn()
 
     def __len__(self) -> int:
-        """Return how many beams the unfinished turn holds."""
         return len(self._beams)
 
     def clear(self) -> None:

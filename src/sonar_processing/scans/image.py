@@ -70,21 +70,14 @@ class PolarImage:
             self._canvas = _canvas(*length, self.parameters.metres_per_pixel)
             self._image = np.zeros((self._canvas.side, self._canvas.side), dtype=np.uint8)
             self._drawn_for = length
-        half = self._width(beam.angle) / 2.0
-        self._fill(wrapped(beam.angle - half), wrapped(beam.angle + half), beam.intensities)
+        step = 0.0 if self._last_angle is None else abs(wrapped(beam.angle - self._last_angle))
+        half = max(self.parameters.beam_width, step if step < _WIDEST_STEP else 0.0) / 2.0
+        first, last = wrapped(beam.angle - half), wrapped(beam.angle + half)
+        begin, end = np.searchsorted(self._canvas.directions, [first, last])
+        for part in [slice(begin, end)] if first <= last else [slice(begin, None), slice(0, end)]:
+            self._image.ravel()[self._canvas.pixels[part]] = beam.intensities[self._canvas.bins[part]]
         self._last_angle = beam.angle
         return self._image
-
-    def _width(self, angle: float) -> float:
-        step = 0.0 if self._last_angle is None else abs(wrapped(angle - self._last_angle))
-        return max(self.parameters.beam_width, step if step < _WIDEST_STEP else 0.0)
-
-    def _fill(self, first: float, last: float, strengths: np.ndarray) -> None:
-        canvas = self._canvas
-        begin, end = np.searchsorted(canvas.directions, [first, last])
-        parts = [slice(begin, end)] if first <= last else [slice(begin, None), slice(0, end)]
-        for part in parts:
-            self._image.ravel()[canvas.pixels[part]] = strengths[canvas.bins[part]]
 
 
 def _canvas(bins: int, range_resolution: float, metres_per_pixel: float) -> _Canvas:

@@ -117,8 +117,9 @@ class TiltScan:
         self._see_time(time)
         if time - self._joint_time > self.parameters.joint_timeout:
             self._miss_joint(time)
-        elif self._is_late(time):
-            self._miss_arrival(time)
+        elif self.state is State.TURNING and self._angle is not None:
+            if time - self._since > self.parameters.move_timeout:
+                self._miss_arrival(time)
         elif self.state is State.SCANNING and time - self._since > self.parameters.scan_timeout:
             self._miss_end(time)
 
@@ -128,10 +129,6 @@ class TiltScan:
 
     def _is_still(self, time: float) -> bool:
         return time - self._still_since >= self.parameters.settle_time
-
-    def _is_late(self, time: float) -> bool:
-        is_turning = self.state is State.TURNING and self._angle is not None
-        return is_turning and time - self._since > self.parameters.move_timeout
 
     def _see_time(self, time: float) -> None:
         if self._now == 0.0:
@@ -152,8 +149,7 @@ class TiltScan:
         self._counter = SweepCounter(self.parameters.scan_beams)
 
     def _go_on(self, time: float) -> None:
-        beyond = not 0 <= self._step + self._direction < len(self._goals)
-        if beyond:
+        if not 0 <= self._step + self._direction < len(self._goals):
             self._direction = -self._direction
             self.sweeps += 1
         self._step = int(np.clip(self._step + self._direction, 0, len(self._goals) - 1))

@@ -23,26 +23,15 @@ from sonar_processing.shapes.echoes import (
 from sonar_processing.shapes.lines import fitted_line
 from sonar_processing.shapes.ransac import RansacParameters, best_hypothesis
 
+# Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s], NaN where it is not known.
 SonarPositions = Callable[[np.ndarray], np.ndarray]
-"""Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s], NaN where it is not known."""
-
-# The next beam of a wall meets it at most so many times as far away as the last one, unless the wall is nearly in line
-# with the beams.
-_NEXT_BEAM = 1.5
-# One echo too near to a circle outweighs so many on it: more than beams that a small thing fills.
-_PENALTY = 4
-# Echoes that graze a buoy at 10 m lie as nearly on a line as on the circle, five of them where a turning vehicle sees
-# it twice; from six on the better fit decides.
-_LINE_ECHOES = 6
-# Echoes of a near side bulge towards the sonar. Noise, and a vehicle that moves between them, makes them as hollow as
-# this, in metres; a niche or a corner of walls is deeper.
-_HOLLOW = 0.25
-# Radii tried for a pair of echoes; more tell nothing new, and clouds with few pairs need not be searched for long.
-_RADII_PER_PAIR = 100
-# Of the fit: rays across a beam's width; standard deviations of a range [m] and, across, of a bearing [m].
-_RAYS = 9
-_RANGE_DEVIATION = 0.1
-_BEARING_DEVIATION = 0.15
+_NEXT_BEAM = 1.5  # times as far as the beams are apart: there the next beam meets a wall that is not in line with them
+_PENALTY = 4  # echoes on a circle that one too near to it outweighs: more than beams that a small thing fills
+_LINE_ECHOES = 6  # from which on the better fit decides: fewer that graze a buoy lie as nearly on a line as on a circle
+_HOLLOW = 0.25  # m: echoes of a near side bulge towards the sonar; noise and motion make them as hollow, niches more
+_RADII_PER_PAIR = 100  # hypotheses of a pair of echoes: more tell nothing new
+_RAYS = 9  # across a beam's width
+_RANGE_DEVIATION, _BEARING_DEVIATION = 0.1, 0.15  # m, standard deviations of a range and, across, of a bearing
 
 
 @dataclass(frozen=True)
@@ -102,14 +91,10 @@ class CircleModel:
         self._towards = seen.towards
         self._parameters = parameters
         self._pairs = cKDTree(seen.points).query_pairs(2.0 * parameters.max_radius, output_type="ndarray")
+        self.enough = _RADII_PER_PAIR * len(self._pairs)
         spacing = seen.step * seen.ranges
         # Where a thing is narrower than the beams are apart, two echoes side by side come from two turns of the head.
         self._next_beam = np.where(spacing > 2.0 * parameters.max_radius, _NEXT_BEAM * spacing, 0.0)
-
-    @property
-    def enough(self) -> int:
-        """Number of hypotheses after which others would be nearly the same."""
-        return _RADII_PER_PAIR * len(self._pairs)
 
     def hypotheses(self, number: int, rng: np.random.Generator) -> np.ndarray:
         """Return circles (n, 4) of random allowed radius through two points each, behind them as the sonar sees it."""
@@ -218,8 +203,11 @@ class CircleDetector:
         fit = fitted_circle(seen, parameters)
         if fit[-1] > parameters.max_residual:
             return None
-        is_line = len(seen.weights) >= _LINE_ECHOES and line_residual(seen.points, seen.weights) <= fit[-1]
-        return None if is_line else fit
+        if len(seen.weights) >= _LINE_ECHOES:
+            line = fitted_line(seen.points, seen.weights)
+            if float(np.sqrt(np.mean((seen.points @ line[:2] - line[2]) ** 2))) <= fit[-1]:
+                return None
+        return fit
 
 
 def hollow_depth(seen: Sightings) -> float:
@@ -229,12 +217,6 @@ def hollow_depth(seen: Sightings) -> float:
     outward = seen.towards.mean(axis=0)
     depth = (seen.points @ outward)[np.argsort(seen.points @ np.array([-outward[1], outward[0]]))]
     return float(depth[1:-1].mean() - depth[[0, -1]].mean())
-
-
-def line_residual(points: np.ndarray, weights: np.ndarray) -> float:
-    """Return the root mean square distance [m] of points (n, 2) from the line that fits them best."""
-    line = fitted_line(points, weights)
-    return float(np.sqrt(np.mean((points @ line[:2] - line[2]) ** 2)))
 
 
 def fitted_circle(seen: Sightings, parameters: CircleDetectorParameters) -> Tuple[np.ndarray, float, float]:

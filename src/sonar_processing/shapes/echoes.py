@@ -8,26 +8,16 @@ import numpy as np
 from sonar_processing.cloud import Cloud
 
 _SAME_POINT = 1e-6
-# Echoes looked at on each side: a neighbouring beam may hold noise or another surface in front of the wall.
-_NEIGHBOURS = 4
-# Beams from an echo to the next one of its wall: one that heard nothing, or two where the head is slow, lie between.
-_REACH = 2.5
-# A wall goes on beyond two of its echoes by this share of their distance; farther out their noise would aim it.
-_CONTINUED = 1.5
-# Sine of the angle between beam and wall above which two echoes make a line. Flatter lines lead from a thing to
-# something far behind it, so that two echoes are in line by chance; then _FLAT_SUPPORT echoes have to lie on it.
-_SQUARE = 0.5
-_FLATTEST = 0.05
-_FLAT_SUPPORT = 4
-# A wall goes on in the next beam, so many times as far away as the beams are apart, where it is not seen too flat.
-_NEXT_BEAM = 1.4
-# Echoes of a wall's neighbouring beams are alike; a lone thing's neighbours hold noise, of fewer bins than this share.
-_ALIKE = 0.5
-# Two echoes of a thing lie across the beams; of a wall that the beams meet obliquely, the one is so much farther away
-# than the other, as a share of their distance across.
-_OBLIQUE = 0.7
-# Bins of speckle are farther apart than those of the usual echo, by this factor at least.
-_SCATTERED = 2.0
+_NEIGHBOURS = 4  # echoes looked at on each side: some hold noise or another surface in front of the wall
+_REACH = 2.5  # beams from an echo to the next one of its wall: one or two between may hear nothing
+_CONTINUED = 1.5  # share of two echoes' distance by which their wall goes on; farther out their noise would aim it
+# Sine of the angle between beam and wall above which two echoes make a line. In flatter lines two echoes may be by
+# chance, a thing and something far behind it: then _FLAT_SUPPORT echoes have to lie on it.
+_SQUARE, _FLATTEST, _FLAT_SUPPORT = 0.5, 0.05, 4
+_NEXT_BEAM = 1.4  # times as far as the beams are apart: there a wall that is not seen too flat goes on
+_ALIKE = 0.5  # share of the bins of a wall's echo that its neighbour has at least; noise has fewer
+_OBLIQUE = 0.7  # of two echoes' distance across the beams: by more along them they are of a wall that is met obliquely
+_SCATTERED = 2.0  # times as far apart as the bins of the usual echo: bins of speckle
 
 
 @dataclass(frozen=True)
@@ -73,24 +63,16 @@ def beam_echoes(cloud: Cloud, gap: float) -> BeamEchoes:
     members = np.flatnonzero(cloud.valid)
     points = cloud.points[members].astype(np.float64)
     stamps = np.abs(cloud.time_stamps[members])
-    starts = np.flatnonzero(_begins(points, stamps, gap))
-    owner = np.repeat(np.arange(len(starts)), np.diff(np.append(starts, len(points))))
+    begins = np.ones(len(points), dtype=bool)
+    begins[1:] = (np.diff(stamps) != 0.0) | (np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1) > gap)
+    starts = np.flatnonzero(begins)
+    owner = np.cumsum(begins) - 1
     strengths = np.maximum(points[:, 3], _SAME_POINT)[:, np.newaxis]
-    sums = _sums(np.hstack([points[:, :2] * strengths, strengths]), starts)
+    weighted = np.hstack([points[:, :2] * strengths, strengths])
+    sums = np.add.reduceat(weighted, starts, axis=0) if len(starts) else weighted
     weights = np.bincount(owner, minlength=len(starts))
     lengths = np.linalg.norm(points[starts + weights - 1, :3] - points[starts, :3], axis=1)
     return BeamEchoes(sums[:, :2] / sums[:, 2:], weights, lengths, members, owner, stamps[starts])
-
-
-def _begins(points: np.ndarray, stamps: np.ndarray, gap: float) -> np.ndarray:
-    begins = np.ones(len(points), dtype=bool)
-    steps = np.linalg.norm(np.diff(points[:, :3], axis=0), axis=1)
-    begins[1:] = (stamps[1:] != stamps[:-1]) | (steps > gap)
-    return begins
-
-
-def _sums(values: np.ndarray, starts: np.ndarray) -> np.ndarray:
-    return np.add.reduceat(values, starts, axis=0) if len(starts) else np.empty((0, values.shape[1]))
 
 
 @dataclass(frozen=True)

@@ -146,15 +146,11 @@ class LineDetector:
         direction = np.array([-line[1], line[0]])
         along = points @ direction
         ends = line[2] * line[:2] + np.outer([along.min(), along.max()], direction)
-        if along.max() - along.min() < self.parameters.min_length or _coverage(along) < self.parameters.min_coverage:
+        coverage = np.count_nonzero(np.histogram(along, bins=_PARTS)[0]) / _PARTS
+        if along.max() - along.min() < self.parameters.min_length or coverage < self.parameters.min_coverage:
             return None
         members = echoes.members[np.isin(echoes.owner, inliers)]
         return Line(line[:2], float(line[2]), ends, members, len(inliers), float(np.sqrt(np.mean(distances**2))))
-
-
-def _coverage(along: np.ndarray) -> float:
-    parts, _ = np.histogram(along, bins=_PARTS)
-    return np.count_nonzero(parts) / _PARTS
 
 
 def fitted_line(points: np.ndarray, weights: np.ndarray) -> np.ndarray:

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sonar_processing.filters.echo_peaks import EchoShape, EchoStatistics
+from sonar_processing.filters.echo_peaks import EchoStatistics
 
 
 def heard(*turns, resolution=0.1):
@@ -23,28 +23,28 @@ def echoing(sigma, noise=0.0, seed=0, beams=120):
 
 
 @pytest.mark.parametrize(
-    ("strengths", "shape"),
+    ("strengths", "are_plateaus"),
     [
-        *(([0, 0, strongest, strongest, strongest, 0], EchoShape.PLATEAU) for strongest in (1, 127, 255)),
-        ([0, 3, 60, 127, 127, 80, 5, 0], EchoShape.PEAK),
-        ([0, 0, 0], EchoShape.PEAK),
+        *(([0, 0, strongest, strongest, strongest, 0], True) for strongest in (1, 127, 255)),
+        ([0, 3, 60, 127, 127, 80, 5, 0], False),
+        ([0, 0, 0], False),
     ],
 )
-def test_strengths_that_say_something_or_nothing_are_plateaus_and_those_that_differ_are_peaks(strengths, shape):
-    assert heard([strengths]).shape is shape
+def test_strengths_that_say_something_or_nothing_are_plateaus_and_those_that_differ_are_peaks(strengths, are_plateaus):
+    assert heard([strengths]).are_plateaus is are_plateaus
 
 
 @pytest.mark.parametrize("gains", [np.repeat([1.0, 0.3, 2.0], 120), 0.3 ** np.linspace(0.0, 1.0, 3600)])
 def test_plateaus_are_known_as_such_while_the_gain_changes(gains):
     strengths = (127.0 * gains[:, np.newaxis] * (echoing(0.5, beams=len(gains)) > 20.0)).astype(np.uint8)
-    assert heard(*np.split(strengths, len(gains) // 120)).shape is EchoShape.PLATEAU
+    assert heard(*np.split(strengths, len(gains) // 120)).are_plateaus
 
 
 def test_a_turn_of_few_equal_strengths_is_outvoted_by_later_ones():
     one_echo = np.zeros((120, 400))
     one_echo[0, 100] = 30.0
-    assert heard(one_echo).shape is EchoShape.PLATEAU
-    assert heard(one_echo, echoing(0.5)).shape is EchoShape.PEAK
+    assert heard(one_echo).are_plateaus
+    assert not heard(one_echo, echoing(0.5)).are_plateaus
 
 
 @pytest.mark.parametrize("sigma", [0.2, 0.5, 1.0])
