@@ -5,7 +5,7 @@ from typing import Optional
 from ping360_driver.message_line import Arrival, MessageLine
 from ping360_driver.messages import MessageError, MessageId
 from ping360_driver.request_scan import Outcome, beam_time, pinged, turning_time
-from ping360_driver.scan_command import TURN, Beam, ScanCommand, beam, information_request, motor_off, refusal
+from ping360_driver.scan_command import INFORMATION_REQUEST, MOTOR_OFF, TURN, Beam, ScanCommand, beam, refusal
 from sonar_driver.port import LineParameters
 
 _PATIENCE = 2  # Beams that have to be missing before the head counts as silent
@@ -56,7 +56,7 @@ class AutoScan:
             return
         if self._can_interrupt:
             self._line.interrupt()
-        self._line.send(motor_off())
+        self._line.send(MOTOR_OFF)
         self._running = None
 
     def _start(self, command: ScanCommand) -> None:
@@ -80,7 +80,7 @@ class AutoScan:
     def _answers(self, outcome: Outcome, command: ScanCommand) -> bool:
         """Return whether the head answers a question; a beam that comes instead is kept."""
         self._is_alive = False
-        self._line.send(information_request())
+        self._line.send(INFORMATION_REQUEST)
         self._wait(outcome, command, _ANSWER_TIME, until_alive=True)
         return self._is_alive
 

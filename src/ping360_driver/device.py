@@ -5,18 +5,19 @@ from typing import Any, Dict, Optional, Union
 
 from ping360_driver.auto_scan import AutoScan
 from ping360_driver.message_line import MessageLine
-from ping360_driver.messages import MessageId
+from ping360_driver.messages import MessageId, PingMessage
 from ping360_driver.request_scan import Outcome, RequestScan
 from ping360_driver.scan_command import (
+    INFORMATION_REQUEST,
+    LAST_WITHOUT_AUTO_TRANSMIT,
+    MOTOR_OFF,
+    PING360,
     TICK,
     Beam,
-    DeviceInformation,
     PulseSettings,
     ScanCommand,
     ScanMode,
-    device_information,
-    information_request,
-    motor_off,
+    firmware_of,
 )
 from sonar_driver.device import LineDevice, LineStats
 from sonar_driver.port import LineParameters, Port, PortUnavailableError, is_datagram_port
@@ -79,7 +80,7 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         self._is_serial = not is_datagram_port(connection.port)
         self._baud_rate = connection.baud_rate if self._is_serial else float("inf")
         self._line: Optional[MessageLine] = None
-        self._information: Optional[DeviceInformation] = None
+        self._can_auto_transmit = False
         self._auto: Optional[AutoScan] = None
         self._requests: Optional[RequestScan] = None
 
@@ -87,34 +88,33 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         self._line = MessageLine(self._port, self._baud_rate, self.connection.byte_gap, self.stop, self.elapsed)
         if self._is_serial:
             self._line.interrupt()
-        self._information = self._who_is_there()
+        firmware = firmware_of(self._who_is_there())
+        self._can_auto_transmit = firmware > LAST_WITHOUT_AUTO_TRANSMIT
         has_scanned = self._auto is not None and self._auto.has_scanned
         self._auto = AutoScan(self._line, self.connection, self._baud_rate, self._is_serial, has_scanned)
         self._requests = RequestScan(self._line, self.connection, self._baud_rate)
-        self._note(firmware=".".join(str(number) for number in self._information.firmware))
+        self._note(firmware=".".join(str(number) for number in firmware))
 
-    def _who_is_there(self) -> DeviceInformation:
+    def _who_is_there(self) -> PingMessage:
         for _ in range(_GREETINGS):
-            self._line.send(information_request())
+            self._line.send(INFORMATION_REQUEST)
             deadline = self.elapsed() + _ANSWER_TIME
             while self.elapsed() < deadline and not self.stop.is_set():
                 arrival = self._line.receive(deadline)
                 if arrival is not None and arrival.message.message_id == MessageId.DEVICE_INFORMATION:
-                    return self._checked(device_information(arrival.message))
+                    device_type = arrival.message.device_type
+                    if device_type == PING360:
+                        return arrival.message
+                    raise PortUnavailableError(
+                        f"what answers at {self.connection.port} is no Ping360: device_type = {device_type}"
+                    )
                 self._line.take_broken()
         raise PortUnavailableError(f"no Ping360 answers at {self.connection.port}; check power, cable and baud_rate")
-
-    def _checked(self, information: DeviceInformation) -> DeviceInformation:
-        if not information.is_ping360:
-            raise PortUnavailableError(
-                f"what answers at {self.connection.port} is no Ping360: device_type = {information.device_type}"
-            )
-        return information
 
     def _take_leave(self, port: Port) -> None:
         if self._is_serial:
             port.send_break()
-        port.write(motor_off())
+        port.write(MOTOR_OFF)
 
     def _ping(self, command: ScanCommand) -> Optional[Ping]:
         outcome = Outcome()
@@ -147,7 +147,7 @@ class Ping360Device(LineDevice[ScanCommand, Ping]):
         return stamp - (before - moment)
 
     def _scan(self, command: ScanCommand) -> Union[AutoScan, RequestScan]:
-        by_itself = command.can_auto_transmit and self._information.can_auto_transmit and not self._auto.refused
+        by_itself = command.can_auto_transmit and self._can_auto_transmit and not self._auto.refused
         if not by_itself:
             self._auto.end()
         mode = ScanMode.AUTO_TRANSMIT if by_itself else ScanMode.REQUEST

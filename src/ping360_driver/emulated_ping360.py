@@ -16,6 +16,7 @@ from ping360_driver.messages import (
 from ping360_driver.scan_command import (
     AHEAD,
     PERIOD_TICKS,
+    PING360,
     SAMPLES,
     TURN,
     PulseSettings,
@@ -34,7 +35,6 @@ from sonar_driver.emulated_head import (
 )
 
 _HALF_TURN = TURN // 2
-_PING360 = 2
 _FIRMWARES = {True: (3, 3, 1), False: (3, 1, 1)}  # With and without auto-transmit
 _TURNING_TIME = 2.4 / TURN  # s per gradian: Ping Viewer's angular speed of the head
 _ANSWER_TIME = 0.002  # s: what a processor needs for an answer that takes no ping
@@ -150,7 +150,7 @@ class EmulatedPing360(EmulatedHead):
             return self._at_once(packed_nack(MessageId.GENERAL_REQUEST, "not known to the emulated head"), time)
         names = ("firmware_version_major", "firmware_version_minor", "firmware_version_patch")
         firmware = dict(zip(names, _FIRMWARES[self._parameters.auto_transmit]))
-        return self._at_once(packed(MessageId.DEVICE_INFORMATION, device_type=_PING360, **firmware), time)
+        return self._at_once(packed(MessageId.DEVICE_INFORMATION, device_type=PING360, **firmware), time)
 
     def _at_once(self, frame: bytes, time: float) -> List[Transmission]:
         return self._paced(frame, time + _ANSWER_TIME)

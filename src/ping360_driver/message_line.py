@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Callable, Deque, List, Optional, Tuple
 
 from ping360_driver.messages import MessageStream, ParsedMessage, PingMessage
-from ping360_driver.scan_command import listening_time
+from ping360_driver.scan_command import TICK
 from sonar_driver.port import Port, transmission_time
 
 # After a break the head measures the speed of the line by this letter: as many ones as zeros, in turn (brping).
@@ -53,7 +53,6 @@ class MessageLine:
         self._reads: Deque[Tuple[int, float]] = deque()
         self._received = 0
         self._last_byte = self.elapsed()
-        self._broken_taken = 0
 
     def send(self, data: bytes) -> float:
         """Send a message; return when its last byte has left, in seconds of the line's clock."""
@@ -65,13 +64,9 @@ class MessageLine:
         self._port.send_break()
         self._port.write(_SPEED_SAMPLE)
         self._stop.wait(_WAKING_TIME)
-        self.discard()
-
-    def discard(self) -> None:
         while self._port.in_waiting and not self._stop.is_set():
             self._port.read(self._port.in_waiting)
         self._stream = MessageStream()
-        self._broken_taken = 0
         self._received = 0
         self._reads.clear()
         self._arrived.clear()
@@ -92,13 +87,13 @@ class MessageLine:
         while not self._arrived and not self._stop.is_set():
             now = self.elapsed()
             self._read()
-            if self._stream.broken > self._broken_taken or (now >= deadline and not self._arrived):
+            if self._stream.broken or (now >= deadline and not self._arrived):
                 break
         return self._arrived.popleft() if self._arrived else None
 
     def take_broken(self) -> int:
-        number = self._stream.broken - self._broken_taken
-        self._broken_taken = self._stream.broken
+        """Return how many broken messages came since the last call."""
+        number, self._stream.broken = self._stream.broken, 0
         return number
 
     def _read(self) -> None:
@@ -131,8 +126,9 @@ class MessageLine:
         if not later:
             return math.inf
         following = later[-1]
+        samples, period = (getattr(following.message, name, 0) for name in ("number_of_samples", "sample_period"))
         is_copy = following.frame == parsed.frame
-        silent = 0.0 if is_copy else listening_time(following.message)
+        silent = 0.0 if is_copy else samples * period * TICK
         return following.begun - silent - transmission_time(len(parsed.frame), self._baud_rate)
 
     def _begun(self, parsed: ParsedMessage) -> float:

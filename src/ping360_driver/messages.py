@@ -60,11 +60,6 @@ def packed_nack(nacked_id: MessageId, reason: str) -> bytes:
     return frame + struct.pack("<H", sum(frame) & 0xFFFF)
 
 
-def unpacked(frame: bytes) -> PingMessage:
-    """Return the message of a whole frame, whose length and checksum are right (`is_whole`)."""
-    return PingMessage(msg_data=bytes(frame))
-
-
 def frame_length(header: bytes) -> int:
     """Return the length of the frame that these 8 bytes begin; raises MessageError if they begin none.
 
@@ -158,7 +153,7 @@ class MessageStream:
 
     def _take(self, length: int) -> ParsedMessage:
         frame = bytes(self._buffer[:length])
-        parsed = ParsedMessage(self._offset, frame, unpacked(frame))
+        parsed = ParsedMessage(self._offset, frame, PingMessage(msg_data=frame))
         self._skip(length)
         if parsed.message.message_id in _BEAMS:
             self._beam_length = length

@@ -93,12 +93,8 @@ class ScanCommand:
         return packed(MessageId.TRANSDUCER, mode=_MODE, angle=angle, transmit=1, **vars(self.pulse))
 
 
-def information_request() -> bytes:
-    return packed(MessageId.GENERAL_REQUEST, requested_id=MessageId.DEVICE_INFORMATION)
-
-
-def motor_off() -> bytes:
-    return packed(MessageId.MOTOR_OFF)
+INFORMATION_REQUEST = packed(MessageId.GENERAL_REQUEST, requested_id=MessageId.DEVICE_INFORMATION)
+MOTOR_OFF = packed(MessageId.MOTOR_OFF)
 
 
 class SectorWalk:
@@ -169,9 +165,9 @@ def pulse_us(max_range: float, period_ticks: int, speed_of_sound: float) -> int:
     return max(PULSE_US[0], min(longest_pulse_us(period_ticks), wanted))
 
 
-_PING360 = 2  # Device type (ping protocol)
+PING360 = 2  # Device type (ping protocol)
 # Ping Viewer lets the head scan by itself from the first firmware after this one.
-_LAST_WITHOUT_AUTO_TRANSMIT = (3, 3, 0)
+LAST_WITHOUT_AUTO_TRANSMIT = (3, 3, 0)
 
 
 @dataclass(frozen=True)
@@ -186,22 +182,6 @@ class Beam:
     pulse: PulseSettings
     echoes: bytes
     sector: Optional[Tuple[int, int, int]] = None
-
-
-@dataclass(frozen=True)
-class DeviceInformation:
-    """Who is at the other end of the line."""
-
-    device_type: int
-    firmware: Tuple[int, int, int]
-
-    @property
-    def is_ping360(self) -> bool:
-        return self.device_type == _PING360
-
-    @property
-    def can_auto_transmit(self) -> bool:
-        return self.firmware > _LAST_WITHOUT_AUTO_TRANSMIT
 
 
 def beam(message: PingMessage) -> Beam:
@@ -219,16 +199,8 @@ def beam(message: PingMessage) -> Beam:
     return Beam(message.angle, pulse, echoes, sector)
 
 
-def listening_time(message: PingMessage) -> float:
-    """Return how long the head listened before it sent a message, in seconds; 0 for one that is no beam."""
-    return getattr(message, "number_of_samples", 0) * getattr(message, "sample_period", 0) * TICK
-
-
-def device_information(message: PingMessage) -> DeviceInformation:
-    return DeviceInformation(
-        message.device_type,
-        (message.firmware_version_major, message.firmware_version_minor, message.firmware_version_patch),
-    )
+def firmware_of(message: PingMessage) -> Tuple[int, int, int]:
+    return message.firmware_version_major, message.firmware_version_minor, message.firmware_version_patch
 
 
 def refusal(message: PingMessage) -> str:

@@ -10,23 +10,24 @@ from ping360_driver.messages import (
     MessageError,
     MessageId,
     MessageStream,
+    PingMessage,
     frame_length,
     is_whole,
     packed,
     packed_nack,
-    unpacked,
 )
 from ping360_driver.scan_command import (
+    INFORMATION_REQUEST,
+    LAST_WITHOUT_AUTO_TRANSMIT,
+    MOTOR_OFF,
     PulseSettings,
     ScanCommand,
     beam,
     bin_length,
-    device_information,
+    firmware_of,
     gradians,
     head_angle,
-    information_request,
     longest_pulse_us,
-    motor_off,
     pulse_us,
     refusal,
     sampling,
@@ -39,7 +40,7 @@ speeds = st.floats(1300.0, 1700.0)
 
 def test_a_request_has_the_bytes_that_the_protocol_gives():
     """As a user of the head recorded them (discuss.bluerobotics.com, topic 11410)."""
-    assert information_request() == bytes.fromhex("42520200060000000400a000")
+    assert bytes.fromhex("42520200060000000400a000") == INFORMATION_REQUEST
 
 
 def test_an_auto_transmit_command_has_the_bytes_that_the_protocol_gives():
@@ -49,14 +50,18 @@ def test_an_auto_transmit_command_has_the_bytes_that_the_protocol_gives():
     assert frame[:24] == bytes.fromhex("425210002a0a0000 010164001004bc02e204c8002c010500")
 
 
+def message_of(frame):
+    return PingMessage(msg_data=frame)
+
+
 def test_a_message_without_payload_is_whole():
-    frame = motor_off()
+    frame = MOTOR_OFF
     assert len(frame) == frame_length(frame[:8]) == 10
     assert is_whole(frame)
 
 
 def test_a_refusal_says_what_was_refused_and_why():
-    message = unpacked(packed_nack(MessageId.AUTO_TRANSMIT, "num_steps out of range"))
+    message = message_of(packed_nack(MessageId.AUTO_TRANSMIT, "num_steps out of range"))
     assert refusal(message) == "the head refused message 2602: num_steps out of range"
 
 
@@ -80,7 +85,7 @@ def test_a_header_that_begins_no_message_is_refused(header, complaint):
 
 def device_data(**changes):
     fields = {"angle": 10, "sample_period": 80, "number_of_samples": 3, "data_length": 3, "data": bytearray(b"abc")}
-    return unpacked(packed(MessageId.DEVICE_DATA, **{**fields, **changes}))
+    return message_of(packed(MessageId.DEVICE_DATA, **{**fields, **changes}))
 
 
 def test_a_beam_says_how_it_was_made():
@@ -91,7 +96,7 @@ def test_a_beam_says_how_it_was_made():
 
 def test_a_beam_of_a_scan_says_its_sector():
     fields = {"sample_period": 80, "start_angle": 5, "stop_angle": 9, "num_steps": 2, "data_length": 1, "data": b"a"}
-    assert beam(unpacked(packed(MessageId.AUTO_DEVICE_DATA, **fields))).sector == (5, 9, 2)
+    assert beam(message_of(packed(MessageId.AUTO_DEVICE_DATA, **fields))).sector == (5, 9, 2)
 
 
 @pytest.mark.parametrize("wrong", [{"angle": 400}, {"data_length": 2}, {"sample_period": 0}])
@@ -105,8 +110,8 @@ def test_a_beam_that_no_head_sends_is_refused(wrong):
 )
 def test_newer_firmware_scans_by_itself(firmware, can):
     names = ("firmware_version_major", "firmware_version_minor", "firmware_version_patch")
-    message = unpacked(packed(MessageId.DEVICE_INFORMATION, device_type=2, **dict(zip(names, firmware))))
-    assert device_information(message).can_auto_transmit is can
+    message = message_of(packed(MessageId.DEVICE_INFORMATION, device_type=2, **dict(zip(names, firmware))))
+    assert (firmware_of(message) > LAST_WITHOUT_AUTO_TRANSMIT) is can
 
 
 @pytest.mark.parametrize(("gradian", "angle"), [(200, 0.0), (300, -math.pi / 2), (100, math.pi / 2), (0, math.pi)])
