@@ -75,6 +75,11 @@ class Sonar:
         """Far end of the last bin, m."""
         return self._model.max_range
 
+    @property
+    def range_resolution(self) -> float:
+        """Length of a bin, m."""
+        return self._model.max_range / self._model.bins
+
     def ping(self, T_world_sonar: np.ndarray, angle: float) -> np.ndarray:
         """Return the strengths (bins,) uint8 of one beam at head `angle` rad from the (4, 4) pose."""
         return self.pings(T_world_sonar[np.newaxis], np.array([angle]))[0]

@@ -73,8 +73,9 @@ def test_a_single_ping_is_a_batch_of_one():
     )
 
 
-def test_parameters_give_pattern_and_range():
+def test_parameters_give_pattern_and_range_resolution():
     assert SonarParameters().pattern() == PATTERN
+    assert _sonar(WALLS).range_resolution == 0.1
     assert _sonar(WALLS).max_range == 50.0
 
 
