@@ -2,27 +2,23 @@
 
 from abc import ABC, abstractmethod
 from collections import deque
-from typing import Deque, Dict, List, Mapping, Optional, Sequence, Tuple, Union
+from typing import Deque, Dict, Mapping, Optional, Sequence, Tuple, Union
 
 import numpy as np
 
-from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
-from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.clouds import CorrectionHistory
+from mlsm_manager.localisation.joint_session import JointSession
 from mlsm_manager.localisation.keyframe_map import KeyframeMaps, MapSettings
 from mlsm_manager.localisation.keyframe_traces import KeyframeCarving
 from mlsm_manager.localisation.updates import NOTHING_INSERTED, CloudUpdate, ScanUpdate
 from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted
 from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
-from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.map_file import Layer
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import transformed
 
-_MOST_WAITING = 8
-"""Clouds that wait for their scans: with one per scan, more than a matcher is ever behind."""
+_MOST_WAITING = 8  # clouds that wait for their scans: with one per scan, more than a matcher is ever behind
 
 
 class Estimator(ABC):
@@ -31,8 +27,15 @@ class Estimator(ABC):
     Scans are inserted into the map that is matched with, clouds into the map that is shown. While `matching` is off
     both are placed by the odometry as corrected so far. An estimator may change the poses of earlier scans with each
     one that is added: `belief`, the maps and the places of clouds are what it knows at the time they are asked for.
+
+    sonar_in_base: (2,) m, from where free space is seen; of the joint solver from the next run on. lookahead: s of
+    odometry after the end of a scan that its track should hold. session: the current run of the joint solver; None
+    where none runs. odometry: what was found out about it, as text for people; empty where nothing had to be.
     """
 
+    lookahead = 0.0
+    session: Optional[JointSession] = None
+    odometry = ""
     _bends = False
     """Whether what is settled in the maps may move with the path."""
 
@@ -43,17 +46,16 @@ class Estimator(ABC):
         matcher: Matcher,
         sonar_in_base: Sequence[float] = (0.0, 0.0),
     ) -> None:
-        """`sonar_in_base`: (2,) m; `mount` changes it."""
         self.settings = settings
         self.errors = errors
         self.matcher = matcher
         self.matching = False
-        self._sonar_in_base = np.array(sonar_in_base, dtype=np.float64)
+        self.sonar_in_base = np.array(sonar_in_base, dtype=np.float64)
         self.clear()
 
     def clear(self) -> None:
         """Delete the map, and forget the pose in it."""
-        self._maps = KeyframeMaps(self.settings, self._bends)
+        self._maps = KeyframeMaps.empty(self.settings, self._bends)
         self.forget_place()
 
     def _take(self, layers: Mapping[Layer, Blocks]) -> None:
@@ -79,38 +81,6 @@ class Estimator(ABC):
         self._expected = belief if len(self.matched) else None
         self.correction = np.array(correction, dtype=np.float64)
 
-    def mount(self, sonar_in_base: np.ndarray) -> None:
-        """Learn where the sonar is in base_link, (2,) m, from where free space is seen."""
-        self._sonar_in_base = sonar_in_base
-
-    @property
-    def lookahead(self) -> float:
-        """Seconds of odometry after the end of a scan that its track should hold."""
-        return 0.0
-
-    @property
-    def rivals(self) -> Optional[RivalSolvers]:
-        """The joint solvers of the current run; None where none runs."""
-        return None
-
-    @property
-    def solver(self) -> Optional[LiveSolver]:
-        """The joint solver that is believed; None where none runs."""
-        return None if self.rivals is None else self.rivals.shown
-
-    @property
-    def odometry(self) -> str:
-        """What was found out about the odometry, as text for people; empty where nothing had to be."""
-        return ""
-
-    def newest_run(self, turns: int) -> Optional[Solution]:
-        """Return the newest `turns` of the head as a run of their own; None where no solver follows them."""
-        return None
-
-    def verdicts(self) -> List[Verdict]:
-        """Return what the run says of itself, without any truth."""
-        return []
-
     @property
     def shown(self) -> MultiLevelSurfaceMap:
         return self._maps.shown.map
@@ -121,17 +91,12 @@ class Estimator(ABC):
         return self._maps.matched.map
 
     @property
-    def free(self) -> KeyframeCarving:
-        """What is known to be free, in the map that is shown."""
-        return self._maps.shown.free
-
-    @property
     def target(self) -> BlockSource:
         """The map in which a lost vehicle is searched."""
         return self.matched
 
     def map_of(self, layer: Layer) -> Union[MultiLevelSurfaceMap, KeyframeCarving]:
-        return {Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self.free}[layer]
+        return {Layer.SHOWN: self.shown, Layer.MATCHED: self.matched, Layer.FREE: self._maps.shown.free}[layer]
 
     @property
     def layers(self) -> Dict[Layer, Blocks]:
@@ -184,7 +149,7 @@ class Estimator(ABC):
             self._uncarved.clear()
         while self._uncarved and self._history.reaches(self._uncarved[0][1]):
             points, times = self._uncarved.popleft()
-            origins = self._origins(times)
+            origins = self._history.origins(times, self.sonar_in_base)
             if origins is not None:
                 return CloudUpdate(NOTHING_INSERTED, False, 0, self._maps.shown.carve(points, times, origins))
         return None
@@ -204,7 +169,7 @@ class Estimator(ABC):
 
     def _show(self, points: np.ndarray, times: np.ndarray, unplaced: int) -> CloudUpdate:
         """Insert points (n, 4) in map, of beams taken at `times` (n,), and carve once it is known from where."""
-        report, origins = self._maps.shown.insert(points), self._origins(times)
+        report, origins = self._maps.shown.insert(points), self._history.origins(times, self.sonar_in_base)
         if origins is not None:
             return CloudUpdate(report, False, unplaced, self._maps.shown.carve(points, times, origins))
         if len(points):
@@ -214,10 +179,6 @@ class Estimator(ABC):
     def _insert_matched(self, points: np.ndarray, times: np.ndarray) -> None:
         """Insert points (n, 4) in map, of beams taken at `times` (n,), into the map that is matched with; carve it."""
         self._maps.matched.insert(points)
-        origins = self._origins(times)
+        origins = self._history.origins(times, self.sonar_in_base)
         if origins is not None:
             self._maps.matched.carve(points, times, origins)
-
-    def _origins(self, times: np.ndarray) -> Optional[np.ndarray]:
-        """Return where the sonar was in map at `times` (n,) [s], (n, 2) m; None where not all of them are known."""
-        return self._history.origins(times, self._sonar_in_base)

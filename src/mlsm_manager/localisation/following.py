@@ -21,17 +21,15 @@ from mlsm_manager.self_check.live_causes import LiveCauses
 from node_support.geometry import composed, move_of, seen_from, transformed, wrapped
 from node_support.timing import UsualInterval
 
-# Of the odometry: a minute at 60 per second, longer than a scan and its match take.
-_MOST_SAMPLES = 4000
+_MOST_SAMPLES = 4000  # of the odometry: a minute at 60 per second, longer than a scan and its match take
 _IDENTITY = np.zeros(3)
 
 
 class LiveCorrection:
     """The correction map -> odom between scans, without jumps: the odometry's errors that were found go on.
 
-    Follows the odometry from the last belief to now. A new belief is approached within `blend_time` seconds.
-
-    Where a belief says how its rates fade, the vehicle is shown to come to rest once the next belief is overdue.
+    A new belief is approached within `blend_time` seconds. Where it says how its rates fade, the vehicle is shown to
+    come to rest once the next belief is overdue.
 
     Safe to use from several threads: one gives it beliefs, another asks for samples.
     """
@@ -93,7 +91,9 @@ class LiveCorrection:
                 return self.start
             if self._jump_time is None:
                 self._jump_time = time
-            left = self._share_left(time - self._jump_time)
+            left = 0.0
+            if self.blend_time > 0.0:
+                left = min(max(1.0 - (time - self._jump_time) / self.blend_time, 0.0), 1.0)
             self._shown = composed(self._state[POSE], left * self._jump) if left else self._state[POSE].copy()
             return _correction(self._shown, odometry)
 
@@ -105,9 +105,7 @@ class LiveCorrection:
             return self.sample(time, odometry)
 
     def _follow(self, time: float, odometry: np.ndarray) -> None:
-        if self._state is None or not self._samples:
-            return
-        if time <= self._state_time:
+        if self._state is None or not self._samples or time <= self._state_time:
             return
         before, pose = self._samples[-1]
         if before < self._state_time:
@@ -137,11 +135,6 @@ class LiveCorrection:
         self._state[POSE] = advanced(self._state, time - before, pose, odometry)
         self._state[RATE] = later
 
-    def _share_left(self, seconds: float) -> float:
-        if self.blend_time <= 0.0:
-            return 0.0
-        return min(max(1.0 - seconds / self.blend_time, 0.0), 1.0)
-
 
 def _correction(T_map_base: np.ndarray, T_odom_base: np.ndarray) -> np.ndarray:
     """Return T_map_odom (3,), with its yaw in [-pi, pi); in plain numbers, which is faster for a single pose."""
@@ -159,7 +152,6 @@ class Following:
     """
 
     def __init__(self, limits: MotionLimits, blend_time: float, clock: Callable[[], float]) -> None:
-        """See Localiser."""
         self.live = LiveCorrection(blend_time)
         self.odometry = ContinuousOdometry(limits)
         self.found = LiveCauses()
@@ -262,11 +254,6 @@ class Following:
         covariance[POSITION, POSITION] += self.found.covariance(self._wrong)
         overdue = self._intervals.overdue(time)
         return PlaceNow(time, time - self._fixed_at, overdue, covariance, self._fixes, self.found.by_mounts)
-
-    @property
-    def last_fix(self) -> np.ndarray:
-        """T_continuous_odom (3,) of the newest odometry."""
-        return self.odometry.fixes(np.array(np.inf))
 
     @property
     def _wrong(self) -> Sequence[Step]:

@@ -1,14 +1,13 @@
 """The joint solver as an estimator: scans in, a map drawn from keyframes and the vehicle's place in it out."""
 
 from time import perf_counter
-from typing import List, Mapping, NamedTuple, Optional, Sequence
+from typing import Mapping, NamedTuple, Optional, Sequence
 
 import numpy as np
 
 from mlsm_manager.joint_solver.live_solver import ODOMETRY, name_of
 from mlsm_manager.joint_solver.parameters import SolverParameters
-from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
-from mlsm_manager.joint_solver.solution import Fix, Solution
+from mlsm_manager.joint_solver.solution import Fix
 from mlsm_manager.localisation.clouds import PATH_POINTS
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.joint_session import (
@@ -26,21 +25,16 @@ from mlsm_manager.odometry.continuous import ReportedMotion
 from mlsm_manager.scan_matching.prediction import OdometryErrors, predicted, updated_by_heading
 from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE, POSITION
-from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.blocks import Blocks, BlockSource
 from mlsm_manager.surface_map.insertion import admitted
 from mlsm_manager.surface_map.map_file import Layer
 from node_support.geometry import composed, transformed
 
-_KNOWN_SCALE = 0.05
-"""Standard deviation of the odometry's scale below which a scan's place is known to about the cut of the solver."""
-_SURE = 0.5
-"""Of an echo's deviation: a fix that is less sure says no more than the comparisons of the same echoes do."""
-_EXPECTED = 100.0
-"""m: where a place is expected less surely, or overflows after a damaged odometry, no scan is searched."""
+_KNOWN_SCALE = 0.05  # deviation of the odometry's scale below which a place is known to about the cut of the solver
+_SURE = 0.5  # of an echo's deviation: a fix that is less sure says no more than the comparisons of the same echoes do
+_EXPECTED = 100.0  # m: where a place is expected less surely, or overflows after a bad odometry, nothing is searched
+# Of a run without reported positions: afterwards these may be reckoned from its own velocities, and prove nothing.
 _SCANS_BEFORE_VELOCITIES = 2
-"""Of a run without reported positions, before it tells its velocity: a dead reckoning made from that changes the
-positions that are reported, and proves nothing."""
 
 
 class Assumed(NamedTuple):
@@ -66,16 +60,12 @@ class Joint(Estimator):
         self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher, sonar_in_base: Sequence[float],
         parameters: SolverParameters, without_positions: Optional[Assumed] = None,
     ) -> None:  # fmt: skip
-        """`sonar_in_base`: (2,) m; `mount` changes it from the next run on.
-
-        without_positions: assumed where the odometry turns out to report no positions; None where its kind was named.
-        """
+        """without_positions: assumed where the odometry turns out to report none; None where its kind was named."""
         self._usual, self._without_positions = Assumed(parameters, errors), without_positions
-        self._session: Optional[JointSession] = None
         super().__init__(settings, errors, matcher, sonar_in_base)
 
     def clear(self) -> None:
-        self._session = None
+        self.session = None
         super().clear()
 
     def forget_place(self) -> None:
@@ -89,62 +79,41 @@ class Joint(Estimator):
     def lookahead(self) -> float:
         return self.parameters.lookahead
 
-    def verdicts(self) -> List[Verdict]:
-        return [] if self._session is None else self._session.verdicts()
-
-    @property
-    def rivals(self) -> Optional[RivalSolvers]:
-        return self._session.rivals if self._session is not None else None
-
-    def newest_run(self, turns: int) -> Optional[Solution]:
-        return None if self._session is None else self._session.newest_run(turns)
-
     @property
     def odometry(self) -> str:
-        if self._session is None:
+        if self.session is None:
             return ""
         if self._without_positions is not None and self.parameters is self._without_positions.parameters:
             return "HEADING, because positions never change"
-        return self._session.rivals.told
+        return self.session.rivals.told
 
     @property
     def target(self) -> BlockSource:
-        """The map in which a lost vehicle is searched: without the newest scan and those that lie apart.
-
-        Where the vehicle was put wrongly it would find itself.
-        """
-        session = self._session
-        if session is None:
+        """Without the newest scan and those that lie apart: where the vehicle was put wrongly it would find itself."""
+        if self.session is None:
             return super().target
-        before_newest = session.solver.log.node_times[-2]
-        return self._maps.matched.drawn_until(min(session.apart_from, before_newest), session)
+        before_newest = self.session.solver.log.node_times[-2]
+        return self._maps.matched.drawn_until(min(self.session.apart_from, before_newest), self.session)
 
     @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
-        """What `restore` needs to go on with the present run, as arrays; none without a run or after a long one."""
-        return {} if self._session is None else self._maps.stored(self._session)
+        """None without a run or after a long one."""
+        return {} if self.session is None else self._maps.stored(self.session)
 
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:
-        """Take stored maps in the place of the present ones; go on with a stored run. See Estimator.restore."""
         self._take(layers)
-        run = StoredRun.of_arrays(keyframes)
+        run, other = StoredRun.of_arrays(keyframes), self._without_positions
         if run is None:
             return ""
+        if other is not None and np.array_equal(run.solver.get(ODOMETRY, ()), name_of(other.parameters.odometry)):
+            self.parameters, self.errors = other
         try:
-            self._assume_as(run)
-            session = self._maps.resumed(run, self.parameters)
+            self.session = self._maps.resumed(run, self.parameters)
         except ValueError as error:
             self._take(layers)
             return str(error)
-        self._session = session
-        self._know(run.scans[-1], session)
+        self._know(run.scans[-1], self.session)
         return ""
-
-    def _assume_as(self, run: StoredRun) -> None:
-        """Assume that a stored run's odometry is of the kind that it was found to be."""
-        other = self._without_positions
-        if other is not None and np.array_equal(run.solver.get(ODOMETRY, ()), name_of(other.parameters.odometry)):
-            self.parameters, self.errors = other
 
     def add_scan(self, scan: Scan) -> ScanUpdate:
         """Find the pose of a scan together with those of the scans before it, and draw the map anew."""
@@ -158,21 +127,21 @@ class Joint(Estimator):
         A stored run goes on where its solver finds the scan on the map, also if the scan alone says too little.
         """
         start = perf_counter()
-        longer = None if self._session is None else resumed_if_it_fits(self._session, scan, self.matched)
+        longer = None if self.session is None else resumed_if_it_fits(self.session, scan, self.matched)
         if longer is not None:
             self._expected = None
             return self._taken(scan, longer, start)
         result = self.matcher.match(scan, self.matched, expected_at(self.correction, scan, expected))
         if not result.accepted:
             return ScanUpdate(scan, result, False, self.belief)
-        if self._session is None:
+        if self.session is None:
             return self.adopt(scan, result)
         self._expected = None
         return self._solve(scan)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Begin a new run at a pose that was found elsewhere, in the map as it is, but without scans that lie apart."""
-        session = self._session
+        session = self.session
         self._end_session(np.inf if session is None else session.apart_from)
         self._expected = None
         # Nobody knows how far the odometry strayed until now: clouds from before are left out.
@@ -183,21 +152,21 @@ class Joint(Estimator):
         return ScanUpdate(scan, result, True, self.belief, forgotten=0 if session is None else session.turns_apart)
 
     def follow(self, track: Track, time: float) -> None:
-        if self._session is not None and time > self.belief.time:
-            self._session.follow(track, time)
+        if self.session is not None and time > self.belief.time:
+            self.session.follow(track, time)
         super().follow(track, time)
 
     @property
     def _known_until(self) -> float:
-        return -np.inf if self._session is None else self._session.known_until
+        return -np.inf if self.session is None else self.session.known_until
 
     def _add_matched(self, cloud: MapCloud) -> CloudUpdate:
-        session = self._session
+        session = self.session
         if cloud.end <= self._found_at:
             return CloudUpdate(NOTHING_INSERTED, False, len(cloud))
         if session is not None and cloud.end <= session.start:
             return self.add_points(transformed(session.T_map_odom, cloud.points))
-        if session is None or cloud.end > session.known_until:
+        if cloud.end > self._known_until:
             return self._wait(cloud)
         self._maps.shown.add(cloud)
         carved = self._maps.shown.draw(session, session.settled_until)
@@ -207,17 +176,17 @@ class Joint(Estimator):
     def _solve(self, scan: Scan) -> ScanUpdate:
         start = perf_counter()
         self._learn_odometry(scan)
-        session = self._session
+        session = self.session
         if session is None:
             known = self.matched.blocks.mean[:, :2]
             correction = self.correction.copy()
-            session = JointSession.begun(self.parameters, self._sonar_in_base, correction, self._start, known)
+            session = JointSession.begun(self.parameters, self.sonar_in_base, correction, self._start, known)
         session.add(scan, self._fix(scan))
         return self._taken(scan, session, start)
 
     def _learn_odometry(self, scan: Scan) -> None:
         """Solve the run anew if the odometry reports positions, or none, otherwise than was assumed."""
-        other, session = self._without_positions, self._session
+        other, session = self._without_positions, self.session
         if other is None:
             return
         self._motion.learn(scan.track)
@@ -230,7 +199,7 @@ class Joint(Estimator):
         if session is None:
             return
         if session.solver.log.scan_count <= self.parameters.free_scans:
-            self._session = session.solved_with(self.parameters)
+            self.session = session.solved_with(self.parameters)
         else:
             # So long the vehicle stood still: where it is in the map is known.
             self._end_session()
@@ -241,7 +210,7 @@ class Joint(Estimator):
 
         None where echoes are plateaus: a single scan of these is metres less certain than its fit says.
         """
-        session, belief = self._session, self.belief
+        session, belief = self.session, self.belief
         if session is None or belief is None or scan.reference_time <= belief.time:
             return None
         solver = session.solver
@@ -262,9 +231,10 @@ class Joint(Estimator):
 
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
-        self._session = session
+        self.session = session
         if session.solver.closed is not None or session.rivals.switched:
-            self._maps.redraw(session)
+            for drawn in self._maps:
+                drawn.redraw(session)
         self._maps.matched.add(MapCloud.of_scan(scan))
         self._maps.matched.draw(session, session.settled_until)
         self._know(scan, session)
@@ -287,7 +257,7 @@ class Joint(Estimator):
 
     def _end_session(self, until: float = np.inf) -> None:
         """End the run; what it heard after `until` [s] is forgotten."""
-        if self._session is not None:
-            self._maps.settle(self._session, until)
-        self._session = None
-        self._start = None
+        if self.session is not None:
+            for drawn in self._maps:
+                drawn.settle(self.session, until)
+        self.session = self._start = None

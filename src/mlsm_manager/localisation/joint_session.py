@@ -25,19 +25,12 @@ from mlsm_manager.self_check.path_checks import odometry_decided, position_uncer
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.geometry import composed, transformed
 
-_LONGEST_PAUSE = 2.0
-"""Usual durations of a scan between two scans: fewer may be a turn that was lost."""
-_MOST_STORED = 200
-"""Scans of a run that are stored with each save: about an hour, and some megabytes."""
-_MOST_SCANS = 30
-"""For one pause, which bounds the time that it costs; in longer ones they are farther apart."""
-_CHECKED_SCANS = 20
-"""Scans that are checked for their agreement with the map: about the window of the solver."""
-_BEFORE = 10.0
-"""s: of odometry before a run, by which its first beams may be late."""
-_MOST_APART = 200
-"""Scans whose place in the map is not known that may still be moved: an hour's, since drawing takes as long as there
-are many."""
+_LONGEST_PAUSE = 2.0  # usual durations of a scan between two scans: fewer may be a turn that was lost
+_MOST_STORED = 200  # scans of a run that are stored with each save: about an hour, and some megabytes
+_MOST_SCANS = 30  # for one pause, which bounds the time that it costs; in longer ones they are farther apart
+_CHECKED_SCANS = 20  # that are checked for their agreement with the map: about the window of the solver
+_BEFORE = 10.0  # s of odometry before a run, by which its first beams may be late
+_MOST_APART = 200  # scans of unknown place that may still be moved: an hour's, since all of them are drawn anew
 
 
 @dataclass
@@ -126,20 +119,16 @@ class JointSession:
         turns = Turns.of(estimates[newest], apart[newest], parts)
         heard = Turns.with_echoes(estimates, apart, parts, self.solver.log.surfaces.counts, _CHECKED_SCANS)
         begin = self.start if len(turns.times) else np.nan
+        found = [*self._going_on(turns.times), recent_agreement(heard.times, heard.agreements, _CHECKED_SCANS)]
+        if len(turns.times) > 1:  # the first one alone does not tell its own speed
+            time, stated = np.array([estimates[-1].time]), np.array([estimates[-1].stated_deviation])
+            found.append(position_uncertainty(time, stated, self.solver.expected_deviations(estimates[-1:])))
         return [
-            *self._going_on(turns.times),
-            recent_agreement(heard.times, heard.agreements, _CHECKED_SCANS),
-            # from the second turn on: the first one alone does not tell its own speed
-            *(self._uncertainty(estimates[-1]) for _ in turns.times[1:2]),
+            *found,
             *surfaces_tell(begin, turns.times, turns.surfaces, self.solver.distance_deviation),
             *in_submaps(turns.times, turns.apart),
             *odometry_decided(self.rivals.doubt),
         ]
-
-    def _uncertainty(self, newest: LiveEstimate) -> Verdict:
-        solver = self.solver
-        expected = solver.expected_deviations([newest])
-        return position_uncertainty(np.array([newest.time]), np.array([newest.stated_deviation]), expected)
 
     def _going_on(self, times: np.ndarray) -> Tuple[Verdict, ...]:
         """Ask whether the newest turns, which ended at `times` (n,) [s], lie on those before them.
@@ -223,9 +212,8 @@ class JointSession:
 def _scans_of_pause(scan: Scan, node_times: np.ndarray) -> List[Scan]:
     """Return scans without points from the newest of node_times (n,) [s] to the beginning of `scan`, n > 0.
 
-    None where that is less than a pause. The last one ends where the scan begins, so that the vehicle's motion
-    within the scan does not hang on that in the pause; there is none before a scan without echoes, whose beginning is
-    not known.
+    None where that is less than a pause, and before a scan without echoes, whose beginning is not known. The last one
+    ends where the scan begins: the vehicle's motion within that does not hang on the one in the pause.
     """
     if len(node_times) < 2:
         return []

@@ -2,7 +2,7 @@
 
 from collections import deque
 from dataclasses import dataclass
-from typing import Deque, Dict, List, Mapping, Optional
+from typing import Deque, Dict, List, Mapping, NamedTuple, Optional
 
 import numpy as np
 
@@ -21,11 +21,9 @@ from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap, Overlay
 
 @dataclass(frozen=True)
 class MapSettings:
-    """The grids of the map that is shown and of the map that is matched with.
-
-    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
-    of blocks to reserve memory for.
-    carver: what marks free space and takes blocks away that beams go through; None where that is not wanted.
+    """resolution, match_resolution: side of a cell of the maps that are shown and matched with, m. limit: greatest
+    coordinate of a point, m. expected_blocks: to reserve memory for. carver: what marks free space and takes blocks
+    away that beams go through; None where that is not wanted.
     """
 
     resolution: float
@@ -51,9 +49,8 @@ class KeyframeMap:
         most_followed: int = MOST_FOLLOWED,
         stretches: Optional[Stretches] = None,
     ) -> None:
-        """`carver`: what marks free space and takes blocks away, None for nothing. most_followed: see KeyframeCarving.
-
-        stretches: what keeps settled keyframes for `redraw`; None for none. The rest as MultiLevelSurfaceMap.
+        """carver, most_followed: see KeyframeCarving. stretches: keeps settled keyframes for `redraw`; None for none.
+        The rest as MultiLevelSurfaceMap.
         """
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks)
         self._free = KeyframeCarving(resolution, limit, carver, most_followed)
@@ -123,16 +120,16 @@ class KeyframeMap:
         carved; None where nothing was.
         """
         self._overlay.take_off()
-        carved = []
+        carved = None
         while self._moving and self._moving[0].end <= settled_until:
-            carved.append(self._settle_oldest(placement))
+            report = self._settle_oldest(placement)
+            carved = report if carved is None else carved + report
         if self._moving:
             self._due = placement
             self._left_out += 1
         else:
             self._due, self._above = None, Blocks.none(self._map.resolution)
-        carved = [report for report in carved if report is not None]
-        return sum(carved[1:], carved[0]) if carved else None
+        return carved
 
     def settle(self, placement: Placement, until: float = np.inf) -> None:
         """Draw all keyframes that end by `until` [s] for the last time, and forget those after it."""
@@ -187,27 +184,32 @@ class KeyframeMap:
         self._overlay.hide(*self._free.outworn(self._map))
 
 
-class KeyframeMaps:
+class KeyframeMaps(NamedTuple):
     """shown: the map of clouds that is shown and saved. matched: the map of echoes in which a lost vehicle is searched.
 
     The matched map is carved by settled scans only: it shows nobody what may still change.
     """
 
-    def __init__(self, settings: MapSettings, bends: bool = True) -> None:
-        """bends: whether what is settled may move with the path, for `redraw`."""
-        own = settings
-        sides = own.resolution, own.match_resolution
-        shown, matched = (Stretches(resolution) if bends else None for resolution in sides)
-        self.shown = KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.carver, stretches=shown)
-        self.matched = KeyframeMap(own.match_resolution, own.limit, 0, own.carver, most_followed=0, stretches=matched)
+    shown: KeyframeMap
+    matched: KeyframeMap
 
     @classmethod
-    def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks], bends: bool = True) -> "KeyframeMaps":
+    def empty(cls, own: MapSettings, bends: bool) -> "KeyframeMaps":
+        """bends: whether what is settled may move with the path, for `redraw`."""
+        sides = own.resolution, own.match_resolution
+        shown, matched = (Stretches(resolution) if bends else None for resolution in sides)
+        return cls(
+            KeyframeMap(own.resolution, own.limit, own.expected_blocks, own.carver, stretches=shown),
+            KeyframeMap(own.match_resolution, own.limit, 0, own.carver, most_followed=0, stretches=matched),
+        )
+
+    @classmethod
+    def of_layers(cls, settings: MapSettings, layers: Mapping[Layer, Blocks], bends: bool) -> "KeyframeMaps":
         """Return stored maps; one without a matched layer is matched with as it is shown.
 
         Raises ValueError for other resolutions than those of the settings.
         """
-        maps, blocks = cls(settings, bends), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
+        maps, blocks = cls.empty(settings, bends), layers.get(Layer.SHOWN, layers.get(Layer.MATCHED))
         maps.shown.map.insert_blocks(blocks)
         maps.matched.map.insert_blocks(layers.get(Layer.MATCHED, blocks))
         if Layer.FREE in layers:
@@ -239,16 +241,6 @@ class KeyframeMaps:
                 self.matched.add(MapCloud.of_scan(scan))
         for cloud in run.clouds:
             self.shown.add(cloud)
-        self.shown.draw(session, session.settled_until)
-        self.matched.draw(session, session.settled_until)
+        for drawn in self:
+            drawn.draw(session, session.settled_until)
         return session
-
-    def redraw(self, session: JointSession) -> None:
-        """Draw both maps anew after the path of a run bent to a loop."""
-        self.shown.redraw(session)
-        self.matched.redraw(session)
-
-    def settle(self, session: JointSession, until: float = np.inf) -> None:
-        """Draw all keyframes of a run that end by `until` [s] for the last time; those after it are forgotten."""
-        self.shown.settle(session, until)
-        self.matched.settle(session, until)

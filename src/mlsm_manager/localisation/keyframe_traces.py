@@ -21,12 +21,10 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap, Overlay
 from mlsm_manager.surface_map.operations import LevelTransform, moved
 from node_support.geometry import move_of
 
-_STRAYED = 0.5
-"""Share of a cell by which a keyframe must have moved since its beams were followed: less changes few free cells."""
+_STRAYED = 0.5  # of a cell, by which a keyframe must have moved since its beams were followed: less changes little
 MOST_FOLLOWED = 2
-"""The beams of so many moving keyframes are followed with each scan: those that moved farthest, and a new one before
-them. More would take over a fifth of the time of a scan. What settles is followed in any case."""
-
+"""The beams of so many moving keyframes are followed with each scan, those that moved farthest: more would take over a
+fifth of its time. What settles is followed in any case."""
 
 Beams = Tuple[np.ndarray, np.ndarray, np.ndarray]
 """Of a keyframe: points (n, 4) in map, the times (n,) [s] of their beams, and where the sonar was then, (n, 2) m."""
@@ -109,10 +107,19 @@ class KeyframeCarving:
             return
         points = [there for there, _, _ in keyframes]
         self._looks.extend([None] * (len(keyframes) - len(self._looks)))
-        for number in self._strayed(points, surface_map.resolution, self._most_followed * scans):
-            beams = FirstEchoes.of_level(*keyframes[number])
-            self._looks[number] = _Look(points[number], self._carver.findings(surface_map, beams, points[number]))
-        self._hit_cells, self._hit_by = _newest_hits(points, surface_map.resolution)
+        moved_by = np.full(len(points), np.inf)
+        for number, look in enumerate(self._looks):
+            if look is not None:
+                moved_by[number] = np.abs(points[number] - look.points)[:, :2].max(initial=0.0)
+        for number in np.argsort(-moved_by, kind="stable")[: self._most_followed * scans]:
+            if moved_by[number] > _STRAYED * surface_map.resolution:
+                beams = FirstEchoes.of_level(*keyframes[number])
+                self._looks[number] = _Look(points[number], self._carver.findings(surface_map, beams, points[number]))
+        # The newest keyframe with a point in each cell.
+        keys = keys_of(np.concatenate(points), surface_map.resolution)
+        by = np.repeat(np.arange(len(points)), [len(part) for part in points])
+        self._hit_cells, last = np.unique(keys[::-1], return_index=True)
+        self._hit_by = by[::-1][last]
 
     def outworn(self, surface_map: MultiLevelSurfaceMap) -> Tuple[Blocks, np.ndarray]:
         """Return blocks of the map that go if the moving keyframes are where they are thought to be, and their rows.
@@ -126,7 +133,8 @@ class KeyframeCarving:
         keys = crossed.keys
         beams = np.concatenate([findings.beams for _, findings in looks])
         number = np.repeat([number for number, _ in looks], [len(findings.beams) for _, findings in looks])
-        counts = number > self._last_hit(keys)
+        hit = np.minimum(np.searchsorted(self._hit_cells, keys), len(self._hit_cells) - 1)
+        counts = (self._hit_cells[hit] != keys) | (number > self._hit_by[hit])
         keys, crossed, beams = keys[counts], crossed.take(counts), beams[counts]
         order = np.argsort(keys, kind="stable")
         cells, starts = np.unique(keys[order], return_index=True)
@@ -137,32 +145,6 @@ class KeyframeCarving:
         more = np.bincount(block[same], weights=beams[entry[same]], minlength=len(blocks))
         gone = (more > 0) & self._carver.is_outworn(blocks, blocks.crossed + more)
         return blocks.take(gone), rows[gone]
-
-    def _strayed(self, points: List[np.ndarray], resolution: float, most: int) -> List[int]:
-        """Return the numbers of the keyframes to be looked at again, at most `most`."""
-        moved = np.array([_moved(look, there) for look, there in zip(self._looks, points)])
-        farthest = np.argsort(-moved, kind="stable")[:most]
-        return farthest[moved[farthest] > _STRAYED * resolution].tolist()
-
-    def _last_hit(self, keys: np.ndarray) -> np.ndarray:
-        """Return the number (n,) of the newest keyframe with a point in each cell, -1 where there is none."""
-        if not len(self._hit_cells):
-            return np.full(len(keys), -1)
-        place = np.minimum(np.searchsorted(self._hit_cells, keys), len(self._hit_cells) - 1)
-        return np.where(self._hit_cells[place] == keys, self._hit_by[place], -1)
-
-
-def _moved(look: Optional[_Look], points: np.ndarray) -> float:
-    """Return by how many metres the keyframe has moved at most; infinity for one that was never looked at."""
-    return np.inf if look is None else float(np.abs(points - look.points)[:, :2].max(initial=0.0))
-
-
-def _newest_hits(points: List[np.ndarray], resolution: float) -> Tuple[np.ndarray, np.ndarray]:
-    """Return the keys of all cells with points, sorted, and the number of the newest keyframe in each."""
-    keys = keys_of(np.concatenate(points), resolution)
-    number = np.repeat(np.arange(len(points)), [len(part) for part in points])
-    cells, last = np.unique(keys[::-1], return_index=True)
-    return cells, number[::-1][last]
 
 
 # So many stretches, or so many blocks in all for each block of the map: of more, two neighbours make one.

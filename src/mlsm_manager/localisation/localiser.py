@@ -1,11 +1,11 @@
 """Scans, clouds and odometry in; a map and T_map_odom at any time out: the same for a live vehicle and a recording."""
 
-import threading
-import time as wall
 from collections import deque
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Any, Callable, Deque, List, Mapping, Optional, Tuple
+from threading import RLock
+from time import monotonic
+from typing import Any, Callable, Deque, Iterable, List, Mapping, Optional, Tuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from mlsm_manager.localisation.place_now import PlaceNow
 from mlsm_manager.localisation.resumption import StoredPlace
 from mlsm_manager.localisation.updates import CloudUpdate, ScanResult, ScanUpdate
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, MatchResult, Scan, Track
+from mlsm_manager.scan_matching.scan import Belief, MapCloud, Matcher, Scan, Track
 from mlsm_manager.scan_matching.scan_path import POSE
 from mlsm_manager.self_check.verdict import Verdict
 from mlsm_manager.surface_map.block_store import finished
@@ -28,14 +28,10 @@ from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, move_of
 
-# s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
-_JUMP_BACK = 30.0
-# s: by more an odometry that goes on leaps only where its clock does.
-_LEAP = 600.0
-# s: two playbacks of a recording begin within a turn or two of the head.
-_SAME_BEGIN = 60.0
-# s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
-# that scans of a fast playback on a busy machine, which are late by a minute, come after it.
+_JUMP_BACK = 30.0  # s: scans and odometry can overtake each other by seconds; a restarted bag jumps by more
+_LEAP = 600.0  # s: by more an odometry that goes on leaps only where its clock does
+_SAME_BEGIN = 60.0  # s: two playbacks of a recording begin within a turn or two of the head
+# s: before the three minutes that tf keeps are over; scans of a fast playback on a busy machine are late by one.
 _LONGEST_SILENCE = 120.0
 _TURNS_COMPARED = 40  # turns of the head in which causes are looked for: ten minutes
 _NEWEST = 3  # scans in which a vehicle is searched on request; two must be found
@@ -63,30 +59,31 @@ class LocaliserSettings:
 
 
 class Localiser:
-    """Safe to use from several threads: a correction can be asked for while a scan is being matched."""
+    """Safe to use from several threads: a correction can be asked for while a scan is being matched.
+
+    changes: a number that grows whenever the map or the pose in it changes. following: what is known between scans.
+    origin: where the map lies on the Earth, where that is known.
+    """
 
     def __init__(
         self,
         estimator: Estimator,
         settings: LocaliserSettings,
         limits: MotionLimits,
-        clock: Callable[[], float] = wall.monotonic,
+        clock: Callable[[], float] = monotonic,
     ) -> None:
         """limits: of the odometry's steps; those beyond are left out.
 
         clock: s, tells how long ago the newest scan came where the odometry has no stamps.
         """
         self.estimator = estimator
-        self._lock = threading.RLock()
+        self._lock = RLock()
         self.changes = 0
-        """A number that grows whenever the map or the pose in it changes."""
         self.following = Following(limits, settings.blend_time, clock)
-        """What is known between scans."""
         self._newest: Deque[Scan] = deque(maxlen=_NEWEST)
         self._search = PlaceSearch()
         self._began = np.inf
         self.origin: Optional[Origin] = None
-        """Where the map lies on the Earth, where that is known."""
         self.use(settings)
 
     def use(self, settings: LocaliserSettings) -> None:
@@ -109,8 +106,7 @@ class Localiser:
     def mount(self, sonar_in_base: np.ndarray) -> None:
         """Learn where the sonar is in base_link, (2,) m."""
         with self._lock:
-            self.estimator.mount(sonar_in_base)
-            self.following.found.sonar_in_base = sonar_in_base
+            self.estimator.sonar_in_base = self.following.found.sonar_in_base = sonar_in_base
 
     @property
     def odometry(self) -> str:
@@ -124,12 +120,14 @@ class Localiser:
 
     def _newest_run(self) -> Optional[Solution]:
         with self._lock:
-            return self.estimator.newest_run(_TURNS_COMPARED)
+            session = self.estimator.session
+            return None if session is None else session.newest_run(_TURNS_COMPARED)
 
     def verdicts(self) -> List[Verdict]:
         """Return what the run says of itself, without any truth."""
         with self._lock:
-            return self.estimator.verdicts()
+            session = self.estimator.session
+            return [] if session is None else session.verdicts()
 
     @property
     def believed_until(self) -> Optional[float]:
@@ -145,7 +143,10 @@ class Localiser:
             self._began = min(self._began, scan.start)
             reported, scan = scan, self.following.taken(scan)
             self._newest.append(scan)
-            update = self._searched(scan) if self.is_lost else self.estimator.add_scan(scan)
+            update = self._searched([scan], self._search) if self.is_lost else None
+            # Few echoes may look like chance in the whole map, but not where the vehicle was expected.
+            if update is None or (self._search.may_be_near and not update.accepted):
+                update = self.estimator.add_scan(scan)
             self._search.learn(update.accepted)
             update = self.following.learned(scan, update, self.estimator.matching)
             clouds = []
@@ -170,13 +171,10 @@ class Localiser:
     @property
     def last_correction(self) -> np.ndarray:
         """T_map_odom (3,) as the newest scan told it."""
-        return composed(self.estimator.correction, self.following.last_fix)
+        return composed(self.estimator.correction, self.following.odometry.fixes(np.array(np.inf)))
 
     def place_now(self, time: float, odometry: np.ndarray) -> Optional[PlaceNow]:
-        """Return how old and how good the position is at `time` [s], when the odometry says T_odom_base (3,).
-
-        None before the first fix.
-        """
+        """See Following.place_at."""
         with self._lock:
             belief = self.estimator.belief
             return None if belief is None else self.following.place_at(time, odometry, belief, self.estimator.errors)
@@ -248,27 +246,20 @@ class Localiser:
         with self._lock:
             if not self._newest:
                 return None
-            search, estimator = PlaceSearch(), self.estimator
-            for scan in self._newest:
-                result = search.found(scan, estimator.target, self._settings.anywhere, estimator.errors)
-            update = self._adopted(scan, result)
+            update = self._searched(self._newest, PlaceSearch())
             if update.accepted:
                 self._search.forget()
                 self.following.live.believe(update.belief)
         return update
 
-    def _searched(self, scan: Scan) -> ScanUpdate:
-        """Search the whole map for a scan, and then where the vehicle was expected: few echoes may look like chance."""
+    def _searched(self, scans: Iterable[Scan], search: PlaceSearch) -> ScanUpdate:
+        """Search the whole map for scans one after the other; where the last one is found the vehicle is."""
         estimator = self.estimator
-        result = self._search.found(scan, estimator.target, self._settings.anywhere, estimator.errors)
-        update = self._adopted(scan, result)
-        return update if update.accepted or not self._search.may_be_near else estimator.add_scan(scan)
-
-    def _adopted(self, scan: Scan, result: MatchResult) -> ScanUpdate:
-        """Take the place where a scan was found as the vehicle's."""
+        for scan in scans:
+            result = search.found(scan, estimator.target, self._settings.anywhere, estimator.errors)
         if result.accepted:
-            return self.estimator.adopt(scan, result)
-        return ScanUpdate(scan, result, False, self.estimator.belief)
+            return estimator.adopt(scan, result)
+        return ScanUpdate(scan, result, False, estimator.belief)
 
     @property
     def is_lost(self) -> bool:

@@ -8,7 +8,6 @@ import numpy as np
 
 from georeferencing.asked import AskedOrigin
 from mlsm_manager.joint_solver.parameters import JointSolverParameters, SolverParameters
-from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.joint import Assumed, Joint
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.localiser import Localiser, LocaliserSettings, MapInput
@@ -26,8 +25,7 @@ from node_support.headers import StampParameters
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_processing.beams.parameters import beam_width_parameter
 
-# A block takes 112 bytes with its part of the index: 1.8 GB, more than a vehicle's computer can spare.
-MAX_PREALLOCATED_CELLS = 16_000_000
+_MOST_CELLS = 16_000_000  # of 112 bytes: 1.8 GB, more than a vehicle's computer can spare
 
 
 class EstimatorName(Enum):
@@ -95,20 +93,17 @@ class LocaliserParameters(
     def build_localiser(self, sonar_in_base: Sequence[float] = (0.0, 0.0)) -> Localiser:
         """Return a localiser with an empty map; sonar_in_base: m, x y of the sonar in base_link."""
         settings = self.localiser_settings()
-        estimator = self._build_estimator(settings.matcher, sonar_in_base)
+        given = self.map_settings(), self.part(OdometryErrors), settings.matcher, sonar_in_base
+        if self.estimator is EstimatorName.THESIS:
+            estimator = ThesisEstimator(*given)
+        else:
+            without_positions = None
+            if self.odometry is OdometryKind.AUTO:
+                other = self.changed(profile_values(OdometryKind.HEADING))
+                without_positions = Assumed(other.solver_parameters(), other.part(OdometryErrors))
+            estimator = Joint(*given, self.solver_parameters(), without_positions)
         estimator.matching = self.start_matching
         return Localiser(estimator, settings, self.part(MotionLimits))
-
-    def _build_estimator(self, matcher: Matcher, sonar_in_base: Sequence[float]) -> Estimator:
-        given = self.map_settings(), self.part(OdometryErrors), matcher, sonar_in_base
-        if self.estimator is EstimatorName.THESIS:
-            return ThesisEstimator(*given)
-        found = self.odometry is OdometryKind.AUTO
-        return Joint(*given, self.solver_parameters(), self._without_positions() if found else None)
-
-    def _without_positions(self) -> Assumed:
-        other = self.changed(profile_values(OdometryKind.HEADING))
-        return Assumed(other.solver_parameters(), other.part(OdometryErrors))
 
     def solver_parameters(self) -> SolverParameters:
         return SolverParameters(
@@ -137,14 +132,8 @@ class LocaliserParameters(
         return DistributionMatcher(limits, self.beam_width, self.range_scale_deviation)
 
     def map_settings(self) -> MapSettings:
-        return MapSettings(
-            self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, self.carver
-        )  # fmt: skip
-
-    @property
-    def carver(self) -> Optional[Carver]:
-        """What marks free space and takes blocks away that beams go through; None where that is not wanted."""
-        return Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
+        carver = Carver(self.part(CarvingParameters), self.beam_width) if self.carve else None
+        return MapSettings(self.resolution, self.match_resolution, self.map_limit, self.expected_blocks, carver)
 
     @property
     def expected_blocks(self) -> int:
@@ -229,10 +218,10 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
 
     def check(self) -> None:
         super().check()
-        if self.expected_blocks > MAX_PREALLOCATED_CELLS:
+        if self.expected_blocks > _MOST_CELLS:
             raise ParameterError(
                 f"size_x_meters = {self.size_x_meters}, size_y_meters = {self.size_y_meters}: at resolution "
-                f"{self.resolution} must make at most {MAX_PREALLOCATED_CELLS} cells"
+                f"{self.resolution} must make at most {_MOST_CELLS} cells"
             )
         try:
             self.asked_origin  # noqa: B018 - validated by reading it
@@ -249,6 +238,5 @@ class MlsmCoreParameters(LocaliserParameters, MlsmNodeParameters, StampParameter
     @property
     def calibration(self) -> Dict[str, Any]:
         """The parameters that a map's blocks depend on, by name, to be stored with it."""
-        names = ("map_input", "match_input", "beam_width", "range_scale_deviation")
         values = self.to_mapping()
-        return {name: values[name] for name in names}
+        return {name: values[name] for name in ("map_input", "match_input", "beam_width", "range_scale_deviation")}

@@ -25,9 +25,8 @@ class PositionState(IntEnum):
 
 class PlaceNow(NamedTuple):
     """time: s, of what is told. age: s since the end of the scan of the newest fix. overdue: s since two more should
-    have come. covariance: (3, 3) of the pose, propagated to now by the odometry's errors, with what causes add to it.
-    fixes: how many there were. by_mounts: m, of the deviation, by the sonar's yaw where nothing tells it: it turns map
-    and place alike, so that the place in the map is known.
+    have come. covariance: (3, 3) of the pose now, with what causes add to it. fixes: how many there were. by_mounts: m,
+    of the deviation, by the sonar's yaw where nothing tells it, which turns map and place alike.
     """
 
     time: float
@@ -46,12 +45,6 @@ class PlaceNow(NamedTuple):
     def in_map(self) -> float:
         """The deviation of the place in the map, m."""
         return float(np.sqrt(max(self.deviation**2 - self.by_mounts**2, 0.0)))
-
-    @property
-    def known_to(self) -> str:
-        """The deviation in words; in brackets that in the map, where most of it is the doubt how the map is turned."""
-        in_map = f" ({self.in_map:.1f} m in the map)" if self.by_mounts > self.in_map else ""
-        return f"{self.deviation:.1f} m{in_map}"
 
     @property
     def is_unknown(self) -> bool:
@@ -91,13 +84,16 @@ def position_state(
         return PositionState.UNKNOWN, "; ".join(["no position yet", *doubts[:1]])
     if place.is_unknown:
         return PositionState.UNKNOWN, "; ".join([f"position not known, {place.in_map:.1f} m", *doubts[:1]])
+    known_to = f"{place.deviation:.1f} m"
+    if place.by_mounts > place.in_map:  # most of it is the doubt how the map is turned
+        known_to += f" ({place.in_map:.1f} m in the map)"
     if doubts:
-        return PositionState.DOUBTFUL, f"position doubtful, {place.known_to}: {'; '.join(doubts)}"
+        return PositionState.DOUBTFUL, f"position doubtful, {known_to}: {'; '.join(doubts)}"
     if is_provisional:
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
     if too_few(place.fixes):
-        return PositionState.PROVISIONAL, f"position provisional, {place.known_to}: {too_few(place.fixes)}"
-    return PositionState.GOOD, f"position good, {place.known_to}"
+        return PositionState.PROVISIONAL, f"position provisional, {known_to}: {too_few(place.fixes)}"
+    return PositionState.GOOD, f"position good, {known_to}"
 
 
 def _clause(cause: Cause, time: float) -> str:

@@ -19,8 +19,7 @@ from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
 from node_support.geometry import seen_from
 
-# m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
-_STRAYED = np.array([1.0, 1.0, 0.1])
+_STRAYED = np.array([1.0, 1.0, 0.1])  # m, rad: by which a vehicle may have left the stored correction in a restart
 _LONGEST_BRIDGE = 30.0  # s: in one or two turns of a head a vehicle hardly leaves a straight line
 # In simulated tours and a marina 0.85 to 1 of a scan lie on the map where the vehicle is, and the two agree by 0.44 to
 # 0.98; of scans 5 m or more aside that agree by 0.4 with the map, 0.81 at most lie on it.
@@ -58,8 +57,8 @@ class StoredPlace:
     def bridged(self, track: Track) -> Track:
         """Return a track that goes straight from here to its beginning, where that is some seconds later.
 
-        A node that is started again within a scan has no odometry of the seconds before. Where it was when it was saved
-        is known, and with the odometry along a straight line the echoes of those seconds lie better than without any.
+        A node that is started again within a scan has no odometry of the seconds before: on a straight line from where
+        it was saved the echoes of those seconds lie better than without any.
         """
         if not 0.0 < track.times[0] - self.belief.time < _LONGEST_BRIDGE:
             return track
@@ -78,10 +77,8 @@ class StoredPlace:
 @dataclass(frozen=True)
 class StoredRun:
     """T_map_odom: (3,) that moves the scans before they are solved. sonar_in_base: (2,) m. scans: all, oldest first.
-
-    solver: see LiveSolver.
-    clouds: of the map that is shown, whose places may still change. shown, matched: what both maps hold without such
-    keyframes, where these lie.
+    solver: see LiveSolver. clouds: of the map that is shown, whose places may still change. shown, matched: what both
+    maps hold without such keyframes, where these lie.
     """
 
     T_map_odom: np.ndarray

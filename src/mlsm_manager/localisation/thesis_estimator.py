@@ -35,7 +35,11 @@ class ThesisEstimator(Estimator):
         if not self.matching or len(self.matched) < _FEWEST_BLOCKS:
             return self._place(scan, belief)
         result = self.matcher.match(scan, self.matched, belief)
-        return self.adopt(scan, result) if result.accepted else self._reject(scan, result, belief)
+        if result.accepted:
+            return self.adopt(scan, result)
+        self.belief = belief
+        self._history.add(*self._path(scan, belief), scan.track, holds=False)
+        return ScanUpdate(scan, result, False, belief)
 
     def adopt(self, scan: Scan, result: MatchResult) -> ScanUpdate:
         """Accept a match: insert the scan into the map, and take its pose over into the belief."""
@@ -65,24 +69,17 @@ class ThesisEstimator(Estimator):
             self.correction = move_of(scan.reference_pose, belief.theta[POSE])
         return ScanUpdate(scan, None, True, self.belief)
 
-    def _reject(self, scan: Scan, result: MatchResult, belief: Belief) -> ScanUpdate:
-        self.belief = belief
-        self._history.add(*self._path(scan, belief), scan.track, holds=False)
-        return ScanUpdate(scan, result, False, belief)
-
     def _belief_at(self, scan: Scan) -> Belief:
         """Return what is known at the scan's reference time before it is matched."""
         if self.belief is None:
-            self.belief = self._first_belief(scan)
+            if self._expected is None:
+                self.belief = belief_at(scan.reference_time, scan.reference_pose, self.errors)
+            else:
+                self.belief = expected_at(self.correction, scan, self._expected)
         if scan.reference_time <= self.belief.time:
             return self.belief
         belief = predicted(self.belief, scan.track, scan.reference_time, self.errors)
         return updated_by_heading(belief, scan.reference_pose[2], self.errors.heading_deviation)
-
-    def _first_belief(self, scan: Scan) -> Belief:
-        if self._expected is None:
-            return belief_at(scan.reference_time, scan.reference_pose, self.errors)
-        return expected_at(self.correction, scan, self._expected)
 
     def _path(self, scan: Scan, belief: Belief) -> tuple:
         """Return times (b,) and T_map_base (b, 3) of a scan that ends at the belief's time, by the odometry."""

@@ -41,11 +41,9 @@ class ScanUpdate:
 
 @dataclass(frozen=True)
 class CloudUpdate:
-    """What was done with a cloud.
-
-    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
-    not inserted because the scan of their time was rejected.
-    carved: what its beams said about free space, None where nobody asked or the vehicle's position is not known.
+    """report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that
+    were not inserted because the scan of their time was rejected. carved: what its beams said about free space, None
+    where nobody asked or the vehicle's position is not known.
     """
 
     report: InsertReport
@@ -108,8 +106,9 @@ def report_causes(health: Health, causes: Sequence[Cause], assumed: str) -> None
     lines = [cause.text if np.isnan(cause.begin) else f"{cause.text} at {cause.begin:.1f} s" for cause in causes]
     health.show("causes", "; ".join(lines) or "none found")
     health.show("assumed", assumed)
-    for line in [line for line, cause in zip(lines, causes) if not cause.is_mended][:1]:
-        health.problem("seconds with a cause to doubt the position", line)
+    wrong = [line for line, cause in zip(lines, causes) if not cause.is_mended]
+    if wrong:
+        health.problem("seconds with a cause to doubt the position", wrong[0])
 
 
 def report_verdicts(health: Health, verdicts: Sequence[Verdict]) -> None:

@@ -164,12 +164,12 @@ class Replayed:
     @property
     def rivals(self) -> Optional[RivalSolvers]:
         """The joint solvers that have taken all scans; None where each was matched alone."""
-        return self.estimator.rivals
+        return None if self.estimator.session is None else self.estimator.session.rivals
 
     @property
     def solver(self) -> Optional[LiveSolver]:
         """The one of them that is believed."""
-        return self.estimator.solver
+        return None if self.estimator.session is None else self.estimator.session.solver
 
     @property
     def silences(self) -> List[Tuple[float, float]]:

@@ -255,7 +255,7 @@ def newest():
     localiser = LocaliserParameters().build_localiser(WHOLE.sonar_in_base)
     for scan in scans_in(WHOLE)[:7]:
         localiser.take_scan(scan)
-    run = localiser.estimator.newest_run(6)
+    run = localiser.estimator.session.newest_run(6)
     return MotionFindings(run, fit_of(run), WHOLE.track), shortened(WHOLE, 50.0).track
 
 

@@ -27,7 +27,7 @@ def localised(**changes):
     taken = scans(4)
     found = np.array([localiser.take_scan(scan).scan.belief.theta[:2] for scan in taken])
     off = np.hypot(*(found - [[SPEED * 16.0 * turn, 0.0] for turn in range(len(taken))]).T)
-    return off, localiser.estimator.rivals
+    return off, localiser.estimator.session.rivals
 
 
 def test_while_the_scale_is_hardly_known_scans_are_found_from_the_second_on():
@@ -53,11 +53,11 @@ def test_in_a_map_whose_newest_scans_are_uncertain_no_scan_is_searched(metres, i
     *known, newest = scans(4)
     for scan in known:
         localiser.take_scan(scan)
-    estimates = localiser.estimator.solver.estimates
+    estimates = localiser.estimator.session.solver.estimates
     covariance = estimates[-1].covariance + metres**2 * np.eye(len(estimates[-1].covariance))
     estimates[-1] = replace(estimates[-1], covariance=covariance)
     localiser.take_scan(newest)
-    assert (4 in localiser.estimator.solver.fixes.by_node) == is_found
+    assert (4 in localiser.estimator.session.solver.fixes.by_node) == is_found
 
 
 def test_a_fix_is_what_the_scan_says_and_not_what_was_expected():

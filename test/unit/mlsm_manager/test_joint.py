@@ -78,7 +78,7 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
     localiser, _ = localiser_after(2)
     update = localiser.relocalise()
     assert update.accepted, update.result.reason
-    assert localiser.estimator.solver is None
+    assert localiser.estimator.session is None
     found = localiser.take_scan(SCANS[2]).scan
     assert found.result is not None
     assert np.hypot(*(found.belief.theta[:2] - SCANS[2].reference_pose[:2])) < 0.5
@@ -180,7 +180,7 @@ def test_a_run_that_was_found_to_have_no_positions_goes_on_after_a_restart():
     assert again.restore(localiser.stored("map", {}, 0.0, "run"), same_odometry=True) == ""
     again.take_scan(WITHOUT_POSITIONS[4])
     assert again.odometry.startswith("HEADING")
-    assert again.estimator.solver.log.scan_count == 5
+    assert again.estimator.session.solver.log.scan_count == 5
 
 
 def test_a_named_odometry_is_not_asked_for():

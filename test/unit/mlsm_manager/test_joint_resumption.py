@@ -156,7 +156,7 @@ def test_a_run_that_does_not_fit_leaves_the_map_alone(stored, name, array):
     assert name in stored.arrays
     arrays = {key: value for key, value in {**stored.arrays, name: array}.items() if value is not None}
     localiser = resumed(replace(stored, arrays=arrays))
-    assert localiser.estimator.solver is None
+    assert localiser.estimator.session is None
     assert localiser.block_count == len(stored.shown)
     assert taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 1])[0].accepted
 
@@ -165,7 +165,7 @@ def test_a_run_with_another_odometry_profile_is_refused(stored):
     other = PARAMETERS.changed({"odometry": "THRUSTERS"}).build_localiser(SONAR_IN_BASE)
     told = "it was stored with another odometry profile: DvlFactors, not ThrusterFactors"
     assert other.restore(stored, same_odometry=True) == told
-    assert other.estimator.solver is None
+    assert other.estimator.session is None
     assert other.block_count == len(stored.shown)
 
 
