@@ -1,7 +1,7 @@
 """What all pages show: of each thing the newest, with the number of its last change."""
 
 import threading
-from typing import Dict, Hashable, Iterable, List, Set, Tuple, Union
+from typing import Dict, Hashable, Iterable, Set, Tuple, Union
 
 from node_support.thin_queue import ThinQueue
 
@@ -63,17 +63,11 @@ class Board:
         """Let everything that changed after the revision `since` wait for a new page."""
         with self.lock:
             self._pages.add(page)
-            for key, item, priority in self._newer(since):
+            for key, (revision, item, priority) in reversed(self._items.items()):
+                if revision <= since:
+                    break
                 page.put(key, item, len(item), priority)
 
     def close(self, page: ThinQueue) -> None:
         with self.lock:
             self._pages.discard(page)
-
-    def _newer(self, since: int) -> List[Tuple[Hashable, Item, int]]:
-        newer = []
-        for key, (revision, item, priority) in reversed(self._items.items()):
-            if revision <= since:
-                break
-            newer.append((key, item, priority))
-        return newer

@@ -9,7 +9,7 @@ import math
 import struct
 from dataclasses import dataclass
 from enum import IntEnum
-from typing import Any, Optional, Union
+from typing import Any, Union
 
 import numpy as np
 
@@ -39,20 +39,14 @@ class Hello:
 
 
 @dataclass(frozen=True)
-class SetMark:
-    """Somebody marks a place."""
-
-    mark: Mark
-
-
-@dataclass(frozen=True)
 class DeleteMark:
     """Somebody deletes a mark."""
 
     name: str
 
 
-Request = Union[Hello, SetMark, DeleteMark]
+Request = Union[Hello, Mark, DeleteMark]
+"""A Mark: somebody marks a place."""
 
 
 def parsed(text: Union[str, bytes]) -> Request:
@@ -66,7 +60,7 @@ def parsed(text: Union[str, bytes]) -> Request:
         if verb == "hello":
             return Hello(_of_type(str, given["run"]), _of_type(int, given["revision"]))
         if verb == "mark":
-            return SetMark(Mark(given["name"], given["x"], given["y"]))
+            return Mark(given["name"], given["x"], given["y"])
         if verb == "delete":
             return DeleteMark(_of_type(str, given["name"]))
     except (ValueError, TypeError, KeyError, RecursionError) as error:
@@ -95,44 +89,24 @@ def _finite(value: Any) -> Any:
     return [_finite(one) for one in value] if isinstance(value, (list, tuple)) else value
 
 
-def tile_bytes(x: int, y: int, columns: Optional["TileColumns"]) -> bytes:
-    """Return the cells of a tile; None: it is empty now."""
-    if columns is None:
-        return struct.pack("<BBHhh", Kind.TILE, 0, 0, x, y)
-    parts = (columns.index, columns.born, columns.level, columns.within)
-    kinds = ("<u2", "<u2", "u1", "u1")
-    head = struct.pack("<BBHhh", Kind.TILE, 0, len(columns.index), x, y)
-    return head + b"".join(part.astype(kind).tobytes() for part, kind in zip(parts, kinds))
-
-
-@dataclass(frozen=True)
-class TileColumns:
-    """Of each cell of a tile (n,): index in the tile, when it was first seen, strength, place within it."""
-
-    index: np.ndarray
-    born: np.ndarray
-    level: np.ndarray
-    within: np.ndarray
-
-
-def beam_bytes(reach: float, ray: "Ray", strengths: np.ndarray) -> bytes:
-    """Return a beam that hears `reach` [m] far, with strengths (bins,) uint8, at most 255 bins."""
-    head = struct.pack("<BBHf", Kind.BEAM, len(strengths), _steps(ray.width), reach)
-    place = struct.pack("<HHff", _steps(ray.from_bow), _steps(ray.in_map), ray.x, ray.y)
-    return head + place + strengths.tobytes()
-
-
-@dataclass(frozen=True)
-class Ray:
-    """Where a beam went: directions from the bow and from the map's x axis, rad, counter-clockwise; its width, rad;
-    x, y [m] in the map from where.
+def tile_bytes(x: int, y: int, columns: np.ndarray) -> bytes:
+    """Return a tile; columns: (4, n), of each cell its index in the tile, when it was first seen, how surely it is
+    known, place within it.
     """
+    head = struct.pack("<BBHhh", Kind.TILE, 0, columns.shape[1], x, y)
+    return head + b"".join(part.astype(kind).tobytes() for part, kind in zip(columns, ("<u2", "<u2", "u1", "u1")))
 
-    from_bow: float
-    in_map: float
-    width: float
-    x: float
-    y: float
+
+def beam_bytes(
+    reach: float, width: float, from_bow: float, in_map: float, place: np.ndarray, strengths: np.ndarray
+) -> bytes:
+    """Return a beam `width` [rad] wide that hears `reach` [m] far, with strengths (bins,) uint8, at most 255 bins.
+
+    from_bow, in_map: its directions from the bow and from the map's x axis, rad, counter-clockwise. place: (2,) m, from
+    where in the map.
+    """
+    head = struct.pack("<BBHf", Kind.BEAM, len(strengths), _steps(width), reach)
+    return head + struct.pack("<HHff", _steps(from_bow), _steps(in_map), *place) + strengths.tobytes()
 
 
 def _steps(angle: float) -> int:

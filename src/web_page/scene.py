@@ -3,8 +3,7 @@
 import math
 import os
 import time
-from dataclasses import dataclass
-from typing import Callable, Dict, List, Optional, Sequence
+from typing import Any, Callable, Dict, List, Optional, Sequence
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from node_support.headers import JUMP_BACK
 from node_support.marks import Mark
 from sonar_processing.beams.beam import Beam
 from web_page.board import BEAM, NOW, TILE, TRACK, WORDS, Board
-from web_page.messages import Kind, Ray, beam_bytes, rows_bytes, text_of
+from web_page.messages import Kind, beam_bytes, rows_bytes, text_of
 from web_page.parameters import WebPageParameters
 from web_page.tiles import BORN_STEP, SIDE, MapTiles
 
@@ -28,16 +27,6 @@ _NARROWEST = 0.0436  # rad: width of a beam
 _WIDEST_STEP = 0.2  # rad: a wider step is a gap, as where a sector begins anew
 
 
-@dataclass(frozen=True)
-class Status:
-    """How well the position is known: state and words of PositionStatus, seconds since the fix, (3, 3) covariance."""
-
-    state: int
-    text: str
-    age: float
-    covariance: np.ndarray
-
-
 class Scene:
     """Keeps what is newest on a board; a time that jumps back begins a new run. The caller holds the board's lock."""
 
@@ -49,7 +38,7 @@ class Scene:
         self._azimuth_deg = EAST_DEG
         self._boot, self._runs = f"{os.getpid()}.{time.time():.0f}", 0
         self._heard: Dict[str, float] = {}
-        self._status: Optional[Status] = None
+        self._status: Dict[str, Any] = {}
         self._marks: Sequence[Mark] = ()
         self._cell = parameters.cell
         self._tiles = MapTiles(lambda tile, data: board.put(("tile", *tile), data, TILE))
@@ -123,9 +112,13 @@ class Scene:
         self._heard["beams"] = self._clock()
         self._disc.take(beam, T_base_sonar, T_map_sonar)
 
-    def take_status(self, status: Status) -> None:
+    def take_status(self, state: int, text: str, age: float, covariance: np.ndarray) -> None:
+        """Take state and words of PositionStatus, seconds since the fix and its covariance (3, 3)."""
         self._heard["status"] = self._clock()
-        self._status = status
+        self._status = {
+            "status": {"state": state, "text": text[:300], "age": age},
+            "covariance": [float(covariance[at]) for at in ((0, 0), (0, 1), (1, 1))],
+        }
 
     def take_marks(self, marks: Sequence[Mark]) -> None:
         self._marks = marks
@@ -140,11 +133,7 @@ class Scene:
             x, y, z, yaw = self._place
             heading = math.degrees(wrapped(math.radians(self._azimuth_deg) - yaw)) % 360.0
             words["pose"] = [round(float(value), 3) for value in (x, y, yaw, -z, heading)]
-        if self._status is not None:
-            status = self._status
-            words["status"] = {"state": status.state, "text": status.text[:300], "age": status.age}
-            words["covariance"] = [float(status.covariance[at]) for at in ((0, 0), (0, 1), (1, 1))]
-        self.board.pass_on("now", text_of(now=words), NOW)
+        self.board.pass_on("now", text_of(now={**words, **self._status}), NOW)
 
     def _waiting(self, clock: float) -> str:
         """Return what never came, the first in the chain; what ceased later, mlsm_core's status says."""
@@ -183,13 +172,9 @@ class History:
         if len(self._rows) < _MOST_ROWS:
             self._show((len(self._rows) - 1) // _CHUNK)
             return
-        before = self._chunks()
         self._rows, self._least = self._rows[1::2], max(2.0 * self._least, 1e-3)
-        for chunk in range(before):
+        for chunk in range(_MOST_ROWS // _CHUNK):
             self._show(chunk)
-
-    def _chunks(self) -> int:
-        return -(-len(self._rows) // _CHUNK)
 
     def _show(self, chunk: int) -> None:
         rows = np.array(self._rows[chunk * _CHUNK : (chunk + 1) * _CHUNK], dtype=np.float64)
@@ -217,8 +202,7 @@ class SonarDisc:
         self._last = from_bow
         width = max(_NARROWEST, step if step < _WIDEST_STEP else 0.0)
         slot = round(from_bow / (2.0 * math.pi) * _SLOTS) % _SLOTS
-        ray = Ray(from_bow, in_map, width, *T_map_sonar[:2, 3])
-        self._put(slot, beam_bytes(reach, ray, pooled(beam.intensities)))
+        self._put(slot, beam_bytes(reach, width, from_bow, in_map, T_map_sonar[:2, 3], pooled(beam.intensities)))
 
 
 def pooled(strengths: np.ndarray) -> np.ndarray:

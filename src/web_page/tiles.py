@@ -1,10 +1,10 @@
 """The map from above in tiles: which cells hold something, how surely, and since when."""
 
-from typing import Callable, Dict, Set, Tuple
+from typing import Callable, Set, Tuple
 
 import numpy as np
 
-from web_page.messages import TileColumns, tile_bytes
+from web_page.messages import tile_bytes
 
 SIDE = 32
 """Cells along a side of a tile."""
@@ -64,13 +64,11 @@ class MapTiles:
         order = np.argsort(owner, kind="stable")
         ends = np.cumsum(np.bincount(owner, minlength=len(tiles)))
         columns = _columns(cells, means, total, cell, self._born)
-        told: Dict[Tuple[int, int], bytes] = {}
-        for (x, y), part in zip(_cells(tiles).tolist(), np.split(order, ends[:-1])):
-            told[x, y] = tile_bytes(x, y, TileColumns(*columns[:, part]))
-        for x, y in self._shown - set(told):
-            self._put((x, y), tile_bytes(x, y, None))
-        for tile, data in told.items():
-            self._put(tile, data)
+        told = dict(zip(map(tuple, _cells(tiles).tolist()), np.split(order, ends[:-1])))
+        for tile in self._shown - set(told):
+            self._put(tile, tile_bytes(*tile, columns[:, :0]))
+        for tile, part in told.items():
+            self._put(tile, tile_bytes(*tile, columns[:, part]))
         self._shown = set(told)
 
 
@@ -85,7 +83,7 @@ def _cells(keys: np.ndarray) -> np.ndarray:
 
 
 def _columns(cells: np.ndarray, means: np.ndarray, total: np.ndarray, cell: float, born: np.ndarray) -> np.ndarray:
-    """Return (4, n) whole numbers in the order of TileColumns."""
+    """Return (4, n) whole numbers as `tile_bytes` takes them."""
     column, row = (cells % SIDE).T
     level = np.minimum(np.rint(_LEVELS_PER_DOUBLING * np.log2(1.0 + total)), 255)
     within = np.clip(np.floor((means / cell - cells) * 16.0), 0, 15)

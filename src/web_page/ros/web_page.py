@@ -1,6 +1,6 @@
 """The ROS side of web_page: beams, fixes, map and diagnostics in; marks out; the rest goes to browsers."""
 
-from typing import List, Optional
+from typing import List, Optional, Union
 
 import numpy as np
 import rospy
@@ -26,9 +26,9 @@ from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.conversions import header, points_from_message
 from underwater_map_construction.msg import PositionStatus
 from web_page.board import Board
-from web_page.messages import DeleteMark, Request, SetMark
+from web_page.messages import DeleteMark
 from web_page.parameters import WebPageParameters
-from web_page.scene import Scene, Status
+from web_page.scene import Scene
 from web_page.server import PageServer, Served
 from web_page.stages import Stages
 
@@ -56,7 +56,7 @@ class WebPage:
         self._asked = rospy.Publisher(topics.SET_MARK, Marker, queue_size=_MARKS_QUEUE)
         self._subscribe()
         try:
-            served = Served(self.board, self._chart, self._ask, self._refuse)
+            served = Served(self.board, self._chart, self._ask, lambda one: self.health.problem(one.kind, str(one)))
             server = PageServer(served, parameters, package_folder() / "web")
         except OSError as error:
             at = f"{parameters.host}:{parameters.port}"
@@ -66,36 +66,33 @@ class WebPage:
 
     def _subscribe(self) -> None:
         self._beams = BeamSubscriber(self._take_beam, self._parameters, self.health)
-        for topic, kind, take, buffer in (
-            (topics.MATCHED_POSE, PoseWithCovarianceStamped, self._take_fix, None),
-            (topics.POSITION_STATUS, PositionStatus, self._take_status, None),
-            (topics.MAP_CLOUD, PointCloud2, self._take_map, _MAP_BUFFER),
-            (topics.MARKS, MarkerArray, self._take_marks, None),
-            (topics.MAP_ORIGIN, Float64MultiArray, self._take_origin, None),
-            ("/diagnostics", DiagnosticArray, self._take_diagnostics, None),
+        for topic, kind, take, options in (
+            (topics.MATCHED_POSE, PoseWithCovarianceStamped, self._take_fix, {}),
+            (topics.POSITION_STATUS, PositionStatus, self._take_status, {}),
+            (topics.MAP_CLOUD, PointCloud2, self._take_map, {"buff_size": _MAP_BUFFER}),
+            (topics.MARKS, MarkerArray, self._take_marks, {}),
+            (topics.MAP_ORIGIN, Float64MultiArray, self._take_origin, {}),
+            ("/diagnostics", DiagnosticArray, self._take_diagnostics, {}),
         ):
-            size = {} if buffer is None else {"buff_size": buffer}
-            rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=_MARKS_QUEUE, **size)
+            rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=_MARKS_QUEUE, **options)
 
     def _chart(self) -> bytes:
         return marks_geojson(self._marks, self._origin)
 
-    def _ask(self, request: Request) -> None:
+    def _ask(self, request: Union[Mark, DeleteMark]) -> None:
         """Ask mlsm_core to set or delete a mark; what it answers on MLSM/marks is what pages show."""
         if self._asked.get_num_connections() == 0:
             raise RefusedInput("requests refused", "mlsm_core, which keeps the marks, does not run")
         asked = Marker(header=header(0, self._parameters.map_frame))
-        if isinstance(request, SetMark):
-            asked.action, asked.text = Marker.ADD, request.mark.name
-            asked.pose.position.x, asked.pose.position.y = request.mark.x, request.mark.y
+        asked.text = request.name
+        if isinstance(request, Mark):
+            asked.action = Marker.ADD
+            asked.pose.position.x, asked.pose.position.y = request.x, request.y
             self.health.count("marks set")
-        elif isinstance(request, DeleteMark):
-            asked.action, asked.text = Marker.DELETE, request.name
+        else:
+            asked.action = Marker.DELETE
             self.health.count("marks deleted")
         self._asked.publish(asked)
-
-    def _refuse(self, refused: RefusedInput) -> None:
-        self.health.problem(refused.kind, str(refused))
 
     def _look(self) -> None:
         now = rospy.get_time()
@@ -125,7 +122,7 @@ class WebPage:
     def _take_status(self, status: PositionStatus) -> None:
         covariance = np.reshape(status.covariance, (3, 3))
         with self.board.lock:
-            self._scene.take_status(Status(status.state, status.text, status.age, covariance))
+            self._scene.take_status(status.state, status.text, status.age, covariance)
 
     def _take_map(self, cloud: PointCloud2) -> None:
         rows = points_from_message(cloud, ("x", "y", "count"))

@@ -6,12 +6,12 @@ import pytest
 
 from node_support.errors import RefusedInput
 from node_support.marks import Mark
-from web_page.messages import DeleteMark, Hello, SetMark, parsed, text_of
+from web_page.messages import DeleteMark, Hello, parsed, text_of
 
 
 def test_a_page_says_hello_and_sets_and_deletes_marks():
     assert parsed('{"hello": {"run": "a.1", "revision": 7}}') == Hello("a.1", 7)
-    assert parsed('{"mark": {"name": "Bøje ⚓", "x": 1.5, "y": -2}}') == SetMark(Mark("Bøje ⚓", 1.5, -2))
+    assert parsed('{"mark": {"name": "Bøje ⚓", "x": 1.5, "y": -2}}') == Mark("Bøje ⚓", 1.5, -2)
     assert parsed('{"delete": {"name": "block"}}') == DeleteMark("block")
 
 

@@ -3,13 +3,14 @@
 import json
 
 import numpy as np
+import pytest
 
 from node_support.health import HealthReport
 from node_support.thin_queue import ThinQueue
 from sonar_processing.beams.beam import Beam
 from web_page.board import Board
 from web_page.parameters import WebPageParameters
-from web_page.scene import Scene, Status, pooled
+from web_page.scene import Scene, pooled
 from web_page.stages import Stages
 
 
@@ -31,6 +32,11 @@ class _Watched:
         return self.texts()["now"]
 
 
+@pytest.fixture
+def watched():
+    return _Watched()
+
+
 def _beam(angle, bins=500):
     return Beam(1, "sonar", angle, np.arange(bins, dtype=np.int64).astype(np.uint8), 0.1)
 
@@ -42,8 +48,7 @@ def _pose(yaw=0.0, z=-3.0):
     return T
 
 
-def test_it_says_what_it_waits_for_in_the_order_of_the_graph():
-    watched = _Watched()
+def test_it_says_what_it_waits_for_in_the_order_of_the_graph(watched):
     assert watched.now()["waiting"] == "waiting for beams on /sonar/raw"
     watched.scene.take_beam(_beam(0.0), np.eye(4), np.eye(4))
     assert watched.now()["waiting"] == "waiting for tf from map to base_link"
@@ -53,25 +58,22 @@ def test_it_says_what_it_waits_for_in_the_order_of_the_graph():
     assert watched.now(5.0)["waiting"] == ""
 
 
-def test_a_silent_mlsm_core_is_told():
-    watched = _Watched()
+def test_a_silent_mlsm_core_is_told(watched):
     watched.scene.take_beam(_beam(0.0), np.eye(4), np.eye(4))
     watched.scene.take_pose(5.0, _pose())
     watched.scene.take_map(5.0, np.zeros((1, 2)), np.ones(1), 0.5)
-    watched.scene.take_status(Status(0, "position good, 0.4 m", 1.0, np.eye(3)))
+    watched.scene.take_status(0, "position good, 0.4 m", 1.0, np.eye(3))
     watched.time = 12.0
     assert watched.now(17.0)["waiting"] == "mlsm_core has said nothing for 12 s"
 
 
-def test_depth_and_heading_are_as_people_read_them():
-    watched = _Watched()
+def test_depth_and_heading_are_as_people_read_them(watched):
     watched.scene.take_pose(5.0, _pose(yaw=np.pi, z=-3.0))
     x, y, _, depth, heading = watched.now(5.0)["pose"]
     assert (x, y, depth, heading) == (1.0, 2.0, 3.0, 270.0)
 
 
-def test_north_follows_where_the_map_lies():
-    watched = _Watched()
+def test_north_follows_where_the_map_lies(watched):
     watched.scene.take_pose(5.0, _pose(yaw=np.pi / 2.0))
     watched.scene.take_azimuth(120.0)
     told = watched.texts()
@@ -79,15 +81,13 @@ def test_north_follows_where_the_map_lies():
     assert watched.now(5.0)["pose"][-1] == 30.0
 
 
-def test_a_covariance_that_is_not_known_is_told_as_null():
-    watched = _Watched()
-    watched.scene.take_status(Status(3, "no position yet", float("nan"), np.full((3, 3), np.nan)))
+def test_a_covariance_that_is_not_known_is_told_as_null(watched):
+    watched.scene.take_status(3, "no position yet", float("nan"), np.full((3, 3), np.nan))
     now = watched.now()
     assert (now["status"]["age"], now["covariance"]) == (None, [None, None, None])
 
 
-def test_time_that_jumps_back_begins_another_run_and_keeps_the_marks():
-    watched = _Watched()
+def test_time_that_jumps_back_begins_another_run_and_keeps_the_marks(watched):
     watched.scene.take_pose(1000.0, _pose())
     before = watched.board.run
     watched.scene.take_pose(10.0, _pose())
@@ -98,8 +98,7 @@ def test_time_that_jumps_back_begins_another_run_and_keeps_the_marks():
     assert watched.now(11.0)["t"] == 1.0
 
 
-def test_a_beam_of_another_range_ends_the_revolution():
-    watched = _Watched()
+def test_a_beam_of_another_range_ends_the_revolution(watched):
     for angle in (0.0, 1.0):
         watched.scene.take_beam(_beam(angle), np.eye(4), np.eye(4))
     watched.scene.take_beam(_beam(2.0, bins=100), np.eye(4), np.eye(4))
@@ -115,8 +114,7 @@ def test_the_strongest_bin_of_those_that_share_a_pixel_is_shown():
     assert pooled(strengths[:50]).tolist() == strengths[:50].tolist()
 
 
-def test_a_stage_is_told_with_its_checks_and_the_cause_that_is_doubted():
-    watched = _Watched()
+def test_a_stage_is_told_with_its_checks_and_the_cause_that_is_doubted(watched):
     values = {
         "scans in": "7", "scans in per second": "0.06", "odometry decided": "fine: it is clear",
         "scans on the map": "DOUBTFUL: 20 %", "causes": "the sonar is turned by 5 deg", "blocks": "12",
@@ -128,8 +126,7 @@ def test_a_stage_is_told_with_its_checks_and_the_cause_that_is_doubted():
     assert stage["cause"] == "the sonar is turned by 5 deg"
 
 
-def test_many_stages_and_long_words_stay_bounded():
-    watched = _Watched()
+def test_many_stages_and_long_words_stay_bounded(watched):
     stages = Stages(watched.board, lambda: 0.0)
     for number in range(1000):
         stages.take(f"{number} " + "x" * 10_000, HealthReport(0, "y" * 10_000, {}))

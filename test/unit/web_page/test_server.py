@@ -12,7 +12,6 @@ from node_support.errors import RefusedInput
 from node_support.files import package_folder
 from node_support.marks import Mark
 from web_page.board import WORDS, Board
-from web_page.messages import SetMark
 from web_page.parameters import WebPageParameters
 from web_page.server import PageServer, Served
 
@@ -78,7 +77,7 @@ def test_a_page_gets_what_is_new_and_may_set_a_mark(site):
     site.board.put("words", '{"words":1}', WORDS)
     assert site.talk(HELLO) == ['{"words":1}']
     site.talk('{"mark": {"name": "block", "x": 1, "y": 2}}', "{}")
-    assert site.asked == [SetMark(Mark("block", 1, 2))]
+    assert site.asked == [Mark("block", 1, 2)]
 
 
 def test_a_page_that_asks_without_end_is_held_up(site):
