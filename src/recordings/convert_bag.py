@@ -14,7 +14,6 @@ from node_support.parameters import ParameterError, assigned_values
 from recordings.bags.bag import RecordingError
 from recordings.bags.messages import Placing
 from recordings.bags.writers import BagWriter, McapWriter
-from recordings.motion.frame_tree import Link
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import MotionSource
 from recordings.reader import Content, ReadingParameters, Request, add_reading_arguments, read, request_of
@@ -80,7 +79,9 @@ def write_converted(path: Path, content: Content, request: Request) -> None:
         start, end = messages[0][0], messages[-1][0]
         if start < 0 or end > _LATEST_NS:
             raise RecordingError(f"{path}: stamps from {start} to {end} ns, must be from 0 to {_LATEST_NS}")
-        bag.write(topics.STATIC_TRANSFORMS, _fixed_links(bag, content, start), start)
+        fixed = [(link, track) for link, track in content.motion.tree.tracks.items() if track.is_fixed]
+        transforms = [bag.transform(pose, bag.time(start), *link) for link, track in fixed for _, pose in _poses(track)]
+        bag.write(topics.STATIC_TRANSFORMS, bag.transforms(transforms), start)
         for stamp_ns, topic, message in messages:
             bag.write(topic, message, stamp_ns)
 
@@ -98,27 +99,18 @@ def _beams(bag: _Writer, beams: List[Beam]) -> Iterator[_Stamped]:
 def _motion(bag: _Writer, content: Content, request: Request) -> Iterator[_Stamped]:
     tracks, names = content.motion.tree.tracks, request.motion
     for link, track in tracks.items():
-        if not track.is_fixed:
-            for index, stamp_ns in enumerate(map(int, track.stamps_ns)):
-                yield stamp_ns, topics.TRANSFORMS, bag.transforms([_transform(bag, link, track, index, stamp_ns)])
+        for stamp_ns, pose in () if track.is_fixed else _poses(track):
+            transform = bag.transform(pose, bag.time(stamp_ns), *link)
+            yield stamp_ns, topics.TRANSFORMS, bag.transforms([transform])
     odometry = tracks.get((names.odom_frame, names.base_frame))
     if odometry is not None and not odometry.is_fixed:
         yield from _odometry(bag, _ODOMETRY, odometry, names.odom_frame, names.base_frame)
 
 
 def _odometry(bag: _Writer, topic: str, track: PoseTrack, frame: str, child: str) -> Iterator[_Stamped]:
-    for index, stamp_ns in enumerate(map(int, track.stamps_ns)):
-        yield stamp_ns, topic, bag.odometry(_placing(track, index), bag.time(stamp_ns), frame, child)
+    for stamp_ns, pose in _poses(track):
+        yield stamp_ns, topic, bag.odometry(pose, bag.time(stamp_ns), frame, child)
 
 
-def _fixed_links(bag: _Writer, content: Content, stamp_ns: int) -> Any:
-    fixed = [(link, track) for link, track in content.motion.tree.tracks.items() if track.is_fixed]
-    return bag.transforms([_transform(bag, link, track, 0, stamp_ns) for link, track in fixed])
-
-
-def _transform(bag: _Writer, link: Link, track: PoseTrack, index: int, stamp_ns: int) -> Any:
-    return bag.transform(_placing(track, index), bag.time(stamp_ns), *link)
-
-
-def _placing(track: PoseTrack, index: int) -> Placing:
-    return Placing(track.translations[index], track.rotations[index])
+def _poses(track: PoseTrack) -> Iterator[Tuple[int, Placing]]:
+    return zip(map(int, track.stamps_ns), map(Placing, track.translations, track.rotations))

@@ -16,7 +16,7 @@ from ping360_driver.scan_command import Beam as HeadBeam
 from ping360_driver.scan_command import beam as head_beam
 from ping360_driver.scan_command import bin_length
 from ping360_driver.scan_command import head_angle as ping360_angle
-from recordings.bags.bag import RecordingError
+from recordings.bags.bag import RecordingError, first_bytes
 from recordings.beams import RecordedBeams
 from recordings.motion.motion_table import is_table, rows_of
 from recordings.ping_viewer_next import head_beams, is_ping_viewer_next
@@ -85,21 +85,10 @@ def _imagenex_beams(path: Path) -> RecordedBeams:
 def _is_ping_viewer_log(path: Path) -> bool:
     """Return whether a file begins as a log of Ping Viewer does; False for one that cannot be read."""
     try:
-        with path.open("rb") as file:
-            PingViewerLog(file.read(_BEGINNING))
-    except (OSError, NoLogError):
+        PingViewerLog(first_bytes(path, _BEGINNING))
+    except NoLogError:
         return False
     return True
-
-
-def _ping_viewer_log(path: Path) -> PingViewerLog:
-    """Return a log. Raises RecordingError."""
-    try:
-        return PingViewerLog(path.read_bytes())
-    except OSError as error:
-        raise RecordingError(f"{path}: {error.strerror}") from None
-    except NoLogError as error:
-        raise RecordingError(f"{path}: not a log of Ping Viewer: {error}") from None
 
 
 def _ping_viewer_beams(path: Path) -> RecordedBeams:
@@ -108,7 +97,10 @@ def _ping_viewer_beams(path: Path) -> RecordedBeams:
     A beam was taken before its message came, by as long as the head listened. Messages that are not whole or hold
     nothing count as refused.
     """
-    log, stream = _ping_viewer_log(path), MessageStream()
+    try:
+        log, stream = PingViewerLog(path.read_bytes()), MessageStream()
+    except OSError as error:
+        raise RecordingError(f"{path}: {error.strerror}") from None
     heads: Dict[int, List[Tuple[Beam, int]]] = {}
     soundings: List[Tuple[float, float]] = []
     inconsistent = 0

@@ -20,30 +20,20 @@ from node_support.geometry import pose_matrix, quaternion_of
 from ping360_driver.messages import MessageError, MessageId
 from ping360_driver.scan_command import Beam as HeadBeam
 from ping360_driver.scan_command import beam as head_beam
-from recordings.bags.bag import RecordingError
+from recordings.bags.bag import RecordingError, first_bytes
+from recordings.bags.ros2_folder import MAGIC
 from recordings.motion.pose_track import LATEST_NS, PoseTrack
 
-_MAGIC = b"\x89MCAP0\r\n"
-_ROS2 = b"ros2"
+_PROFILE, _ROS2 = len(MAGIC) + 1 + 8 + 4, b"ros2"  # after number and length of the header, and the profile's length
 _TOPIC = re.compile(r"/?(device_[^/]+)/(Ping360|VehicleData)")
 _AT_SURFACE = 1.0  # m below the highest altitude: deeper no satellite is heard, and the estimator reckons on
 
 
 def is_ping_viewer_next(path: Path) -> bool:
-    """Return whether a file is an MCAP file that ROS 2 has not written."""
-    if path.suffix.lower() != ".mcap":
-        return False
-    try:
-        with path.open("rb") as file:
-            start = file.read(64)
-    except OSError:
-        return False
-    # Magic, number and length of the header, length of its profile.
-    place = len(_MAGIC) + 1 + 8
-    if len(start) < place + 4 or not start.startswith(_MAGIC):
-        return False
-    (length,) = struct.unpack_from("<I", start, place)
-    return start[place + 4 : place + 4 + length] != _ROS2
+    """Return whether a file is an MCAP file that ROS 2 has not written, by the profile in its header."""
+    start = first_bytes(path, _PROFILE + len(_ROS2)) if path.suffix.lower() == ".mcap" else b""
+    is_mcap = len(start) >= _PROFILE and start.startswith(MAGIC)
+    return is_mcap and start[_PROFILE - 4 :] != struct.pack("<I", len(_ROS2)) + _ROS2
 
 
 def head_beams(path: Path) -> Tuple[List[Tuple[float, HeadBeam]], int, List[str]]:
@@ -81,10 +71,8 @@ def vehicle_headings(path: Path) -> Optional[PoseTrack]:
         if time_ns < LATEST_NS and all(isinstance(angle, (int, float)) for angle in angles):
             stamps.append(time_ns)
             rotations.append(quaternion_of(pose_matrix((0.0, 0.0, 0.0), angles)))
-    if not stamps:
-        return None
     track = PoseTrack.sorted_from(np.array(stamps), np.zeros((len(stamps), 3)), np.array(rotations))
-    return track.turned_up()
+    return track.turned_up() if stamps else None
 
 
 def vehicle_fixes(path: Path) -> List[Fix]:

@@ -100,22 +100,17 @@ def mounted(
     tree: FrameTree, base_frame: str, recorded: RecordedBeams, parameters: MountingParameters
 ) -> Tuple[FrameTree, List[str]]:
     """Return a tree in which every frame of beams is linked to the vehicle, and what was assumed for that."""
-    notes = []
-    vehicle = parameters.mounted_in or base_frame
-    pose = parameters.matrix()
+    notes, one = [], parameters
+    vehicle, pose = one.mounted_in or base_frame, one.matrix()
+    words = (
+        f"taken as mounted in {vehicle} at {one.mount_x:g} {one.mount_y:g} {one.mount_z:g} m, yaw {one.mount_yaw:g} rad"
+        f"{', upside down' if one.upside_down else ''} (--set mount_x, mount_y, mount_z, mount_yaw, upside_down)"
+    )
     for frame in sorted({beam.frame_id for beam in recorded.beams}):
         if tree.links_between(base_frame, frame) is None:
             tree = tree.with_track(vehicle, frame, PoseTrack.fixed(pose[:3, 3], quaternion_of(pose)))
-            notes.append(f"tf does not place {frame} on the vehicle: {_in_words(parameters, vehicle)}")
+            notes.append(f"tf does not place {frame} on the vehicle: {words}")
     return tree, notes
-
-
-def _in_words(one: MountingParameters, vehicle: str) -> str:
-    upside_down = ", upside down" if one.upside_down else ""
-    return (
-        f"taken as mounted in {vehicle} at {one.mount_x:g} {one.mount_y:g} {one.mount_z:g} m, yaw {one.mount_yaw:g} rad"
-        f"{upside_down} (--set mount_x, mount_y, mount_z, mount_yaw, upside_down)"
-    )
 
 
 def tried(problems: List[str], step: Callable[[], Optional[_Result]]) -> Optional[_Result]:
@@ -161,8 +156,7 @@ def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
     headings = vehicle_headings(path)
     if headings is not None:
         note = f"no odometry: {len(headings)} headings from {path.name}, the position is unknown"
-        tree = linked(FrameTree(), replace(request.motion, z_is_down=False), headings)
-        return Motion(tree, MotionSource.HEADING, [note])
+        return Motion(linked(FrameTree(), request.motion, headings), MotionSource.HEADING, [note])
     return unsaid_motion(FrameTree(), request.motion, "beams only")
 
 
@@ -170,7 +164,7 @@ def _with_mounts(motion: Motion, bag: Bag, names: MotionNames) -> Motion:
     """Return the motion of a file without frames, with what the bag of the beams says of where things are mounted."""
     fixed = {link: track for link, track in frame_tree(bag).tracks.items() if track.is_fixed}
     track = motion.tree.tracks[(names.odom_frame, names.base_frame)]
-    return replace(motion, tree=linked(FrameTree(fixed), replace(names, z_is_down=False), track))
+    return replace(motion, tree=linked(FrameTree(fixed), names, track))
 
 
 def _truth(bags: List[Bag], request: Request) -> Optional[PoseTrack]:
@@ -187,7 +181,7 @@ def _truth(bags: List[Bag], request: Request) -> Optional[PoseTrack]:
         raise RecordingError(f"{topic} holds {kind}, must be Odometry or PoseStamped") from None
     if not len(track):
         raise RecordingError(f"{topic} holds no pose")
-    return track.turned_up() if request.motion.z_is_down else track
+    return request.motion.upward(track)
 
 
 def _check_common_time(path: Path, recorded: RecordedBeams, tree: FrameTree, request: Request) -> None:
@@ -220,11 +214,9 @@ def add_reading_arguments(parser: argparse.ArgumentParser) -> None:
         help="the vehicle moved, and nothing tells how: no position, no heading",
     )  # fmt: skip
     parser.add_argument(
-        "--vehicle",
-        type=Path,
-        metavar="FILE",
+        "--vehicle", type=Path, metavar="FILE",
         help="bag, table or autopilot's log (.tlog, .BIN) with the motion, if the recording has none",
-    )
+    )  # fmt: skip
     parser.add_argument(
         "--offset", type=float, metavar="SECONDS",
         help="added to the stamps of the beams, whose clock is not that of the motion; the default is 0, or with an "

@@ -58,11 +58,10 @@ def survey(path: Path, request: Request) -> Survey:
     """
     if is_makers_log(path):
         missing: List[str] = []
-        recorded = makers_beams(path)
+        recorded, kind = makers_beams(path), "a log or table of beams"
         motion = tried(missing, lambda: motion_for(path, None, request))
         assumed = _assumed(motion, recorded, request, missing)
-        heard = beam_lines(recorded)
-        return Survey(path, "a log or table of beams", {}, FrameTree(), None, heard, [], assumed, missing)
+        return Survey(path, kind, {}, FrameTree(), None, beam_lines(recorded), [], assumed, missing)
     with bag_of_beams(path) as bag:
         return _survey_of_bag(path, bag, request)
 
@@ -122,25 +121,21 @@ def _gravity(bag: Bag, topic: str) -> Optional[float]:
 
 def report(survey: Survey, request: Request) -> str:
     """Return what a bag holds, what will be assumed, what is missing, and a command line to start with."""
-    lines = [f"{survey.path}: {survey.kind}", *_section("heard", survey.heard or ["nothing"])]
+    sections = {"heard": survey.heard or ["nothing"]}
     for role in _SHOWN if survey.topics else ():
-        lines_of_role = [f"{topic.name} ({topic.type}, {topic.count} messages)" for topic in survey.topics[role]]
-        lines += _section(role.value, lines_of_role or ["none"])
-    links = [
-        f"{parent} -> {child}: {_known_time(track)}" for (parent, child), track in sorted(survey.tree.tracks.items())
-    ]
+        topics = [f"{topic.name} ({topic.type}, {topic.count} messages)" for topic in survey.topics[role]]
+        sections[role.value] = topics or ["none"]
     if survey.topics:
-        lines += _section("frames", links or ["none"])
-        lines += _section("signs of z down", survey.z_down or ["none"])
-    lines += _section("assumed", survey.assumed or ["nothing"])
-    lines += _section("missing", survey.missing or ["nothing"])
+        tracks = sorted(survey.tree.tracks.items())
+        links = [f"{parent} -> {child}: {_known_time(track)}" for (parent, child), track in tracks]
+        sections.update({"frames": links or ["none"], "signs of z down": survey.z_down or ["none"]})
+    sections.update(assumed=survey.assumed or ["nothing"], missing=survey.missing or ["nothing"])
     if not survey.missing:
-        lines += _section("start with", [_command(survey, request)])
+        sections["start with"] = [_command(survey, request)]
+    lines = [f"{survey.path}: {survey.kind}"]
+    for title, told in sections.items():
+        lines += [f"{title}:", *(f"    {line}" for line in told)]
     return "\n".join(lines)
-
-
-def _section(title: str, lines: List[str]) -> List[str]:
-    return [f"{title}:", *(f"    {line}" for line in lines)]
 
 
 def _known_time(track: PoseTrack) -> str:

@@ -1,13 +1,12 @@
 """Reads bags: ROS 1 files, and ROS 2 folders or single files (sqlite3, mcap)."""
 
-from contextlib import ExitStack, contextmanager
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, Iterator, List, Tuple, Union
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag2 import Reader as Ros2Reader
-from rosbags.typesys.store import Typestore
 
 from recordings.bags.message_types import defined_in, ros2_types
 from recordings.bags.ros1_reader import Ros1Reader
@@ -27,6 +26,15 @@ class RecordingError(ValueError):
     """A recording cannot be used; the text is one line that says which, why and what to do."""
 
 
+def first_bytes(path: Path, count: int) -> bytes:
+    """Return how a file begins; nothing of one that cannot be read."""
+    try:
+        with path.open("rb") as file:
+            return file.read(count)
+    except OSError:
+        return b""
+
+
 @dataclass(frozen=True)
 class Topic:
     """name; type: package/Name, the same for ROS 1 and ROS 2; count: number of messages."""
@@ -36,23 +44,18 @@ class Topic:
     count: int
 
 
-class Bag:
-    """An open bag; a context manager. Everything raises RecordingError for a file that cannot be read."""
+class Bag(AbstractContextManager):
+    """An open bag. Everything raises RecordingError for a file that cannot be read."""
 
     def __init__(self, path: Path) -> None:
         """Raises RecordingError, also for a file that is no bag."""
         self.path = path
-        self._open = ExitStack()
-        self._stores: Dict[Tuple[str, str], Typestore] = {}
         with _in_one_line(path), ExitStack() as stack:
             self._reader = _reader(path, stack)
             stack.enter_context(self._reader)
             self.topics = _topics(self._reader.connections)
             """All topics by their names."""
             self._open = stack.pop_all()
-
-    def __enter__(self) -> "Bag":
-        return self
 
     def __exit__(self, *exception: object) -> None:
         self._open.close()
@@ -80,27 +83,17 @@ class Bag:
             for connection, time, raw in self._reader.messages(connections):
                 if not isinstance(time, int):  # sqlite holds anything anywhere
                     raise RecordingError(f"{self.path}: damaged: a message of {topic} was recorded at {time!r}")
-                yield time, readers[connection.id](raw)
+                yield time, readers[connection.id](raw, connection.msgtype)
 
-    def _deserializer(self, connection: Connection) -> Callable[[bytes], Any]:
-        store = self._store_of(connection)
-        if self.is_ros2:
-            return lambda raw: store.deserialize_cdr(raw, connection.msgtype)
-        return lambda raw: store.deserialize_ros1(raw, connection.msgtype)
-
-    def _store_of(self, connection: Connection) -> Typestore:
-        """Return the types of a topic alone: what other topics define wrongly, or otherwise, does not matter."""
-        if not connection.msgdef:
-            if connection.msgtype not in ros2_types().types:
-                raise RecordingError(
-                    f"{self.path}: {connection.topic} holds {connection.msgtype}, which the bag does not define; "
-                    "record with ROS 2 Iron or newer, or into mcap"
-                )
-            return ros2_types()
-        key = connection.msgtype, connection.msgdef
-        if key not in self._stores:
-            self._stores[key] = defined_in(connection.msgdef, connection.msgtype)
-        return self._stores[key]
+    def _deserializer(self, connection: Connection) -> Callable[[bytes, str], Any]:
+        """Return what reads a topic, by its types alone: what others define wrongly, or otherwise, does not matter."""
+        if not connection.msgdef and connection.msgtype not in ros2_types().types:
+            raise RecordingError(
+                f"{self.path}: {connection.topic} holds {connection.msgtype}, which the bag does not define; "
+                "record with ROS 2 Iron or newer, or into mcap"
+            )
+        store = defined_in(connection.msgdef, connection.msgtype) if connection.msgdef else ros2_types()
+        return store.deserialize_cdr if self.is_ros2 else store.deserialize_ros1
 
 
 def _topics(connections: Iterable[Connection]) -> Dict[str, Topic]:
@@ -141,9 +134,7 @@ def _in_one_line(path: Path) -> Iterator[None]:
 
 def _packed(path: Path) -> str:
     """Return which program packed a file, and how to unpack it; empty: none that is known."""
-    with path.open("rb") as file:
-        start = file.read(8)
     for magic, packer, unpack in _PACKED:
-        if start.startswith(magic):
+        if first_bytes(path, len(magic)) == magic:
             return f"packed with {packer}; unpack it first: {unpack} {path}"
     return ""

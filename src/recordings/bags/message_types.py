@@ -29,6 +29,7 @@ _OWN_TYPES = {
 }
 
 
+@lru_cache(maxsize=None)
 def defined_in(definition: str, name: str) -> Typestore:
     """Return a store with the type `name` and those it consists of, as a bag defines them."""
     store = get_typestore(Stores.EMPTY)

@@ -7,7 +7,7 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 from shutil import copyfileobj
 from tempfile import TemporaryDirectory
-from typing import Any, Dict, Iterator, List, Optional, Tuple
+from typing import Any, Dict, Iterator, List, Optional
 
 import yaml
 from rosbags.interfaces import Connection
@@ -16,8 +16,8 @@ from rosbags.rosbag2.storage_mcap import MCAPFile
 STORAGES = {".mcap": "mcap", ".db3": "sqlite3"}
 METADATA, _INFORMATION = "metadata.yaml", "rosbag2_bagfile_information"
 _NEWEST_VERSION = 8  # of metadata that rosbags 0.9.23 reads; ROS 2 Jazzy writes 9
-_MAGIC, _FOOTER = b"\x89MCAP0\r\n", 2
-_NO_SUMMARY = bytes([_FOOTER, 20]) + bytes(7 + 20) + _MAGIC
+MAGIC, _FOOTER = b"\x89MCAP0\r\n", 2
+_NO_SUMMARY = bytes([_FOOTER, 20]) + bytes(7 + 20) + MAGIC
 _RECORDS = range(1, 16)  # of MCAP, by their numbers
 
 
@@ -37,7 +37,9 @@ def readable_folder(path: Path) -> Iterator[Path]:
         folder = Path(name)
         links = [_link_to(file.absolute(), folder) for file in files]
         if metadata is None:
-            metadata = _counted(sorted((link for link in links if link.suffix in STORAGES), key=_by_number))
+            # .._2 comes before .._10.
+            links.sort(key=lambda link: (len(link.name), link.name))
+            metadata = _counted([link for link in links if link.suffix in STORAGES])
         # JSON is YAML too.
         (folder / METADATA).write_text(json.dumps({_INFORMATION: {**metadata, "version": _NEWEST_VERSION}}))
         yield folder
@@ -57,11 +59,6 @@ def _metadata_of(path: Path) -> Optional[Dict[str, Any]]:
         return None
 
 
-def _by_number(file: Path) -> Tuple[int, str]:
-    """Return what orders files as they were recorded: .._2 comes before .._10."""
-    return len(file.name), file.name
-
-
 def _link_to(file: Path, folder: Path) -> Path:
     """Return a link in `folder` to a file. An MCAP file that was cut off is copied there instead, and ended."""
     link = folder / file.name
@@ -78,13 +75,13 @@ def _link_to(file: Path, folder: Path) -> Path:
 
 def _is_ended(file: Path) -> bool:
     with file.open("rb") as opened:
-        opened.seek(max(file.stat().st_size - len(_MAGIC), 0))
-        return opened.read() == _MAGIC
+        opened.seek(max(file.stat().st_size - len(MAGIC), 0))
+        return opened.read() == MAGIC
 
 
 def _end_of_whole_records(file: Path) -> int:
     """Return how many bytes of an MCAP file are whole records of its data."""
-    size, end = file.stat().st_size, len(_MAGIC)
+    size, end = file.stat().st_size, len(MAGIC)
     with file.open("rb") as opened:
         while True:
             opened.seek(end)

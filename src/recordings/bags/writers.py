@@ -1,5 +1,6 @@
 """Writes bags of ROS 1, and MCAP files of ROS 2 with their message types, which Foxglove opens; without ROS."""
 
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, Dict
 
@@ -21,8 +22,8 @@ class _Replaced(type(Path())):
         return super().open(mode.replace("x", "w"), *arguments, **options)
 
 
-class BagWriter(StoreMessages):
-    """An open bag; a context manager. What is at its path is replaced, so give it a file of `whole_file`."""
+class BagWriter(StoreMessages, AbstractContextManager):
+    """An open bag. What is at its path is replaced, so give it a file of `whole_file`."""
 
     def __init__(self, path: Path, compression: str = "none") -> None:
         """`compression`: one of COMPRESSIONS. Raises OSError."""
@@ -34,9 +35,6 @@ class BagWriter(StoreMessages):
             self._writer.set_compression(Writer.CompressionFormat[compression.upper()])
         self._connections: Dict[str, Connection] = {}
         self._writer.open()
-
-    def __enter__(self) -> "BagWriter":
-        return self
 
     def __exit__(self, *exception: object) -> None:
         self._writer.close()
@@ -54,8 +52,8 @@ def mcap_writer() -> Any:
     return needed("mcap.writer", "pip install mcap", lambda text: RecordingError(f"MCAP: {text}")).Writer
 
 
-class McapWriter(StoreMessages):
-    """An open file; a context manager, used as BagWriter. What is at its path is replaced."""
+class McapWriter(StoreMessages, AbstractContextManager):
+    """An open file, used as BagWriter. What is at its path is replaced."""
 
     def __init__(self, path: Path) -> None:
         """Raises OSError, and RecordingError without the library."""
@@ -64,9 +62,6 @@ class McapWriter(StoreMessages):
         self._writer.start(profile="ros2", library="underwater_map_construction")
         self._channels: Dict[str, int] = {}
         self._schemas: Dict[str, int] = {}
-
-    def __enter__(self) -> "McapWriter":
-        return self
 
     def __exit__(self, *exception: object) -> None:
         self._writer.finish()

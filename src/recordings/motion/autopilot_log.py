@@ -3,8 +3,6 @@
 Sources: common.xml of MAVLink (ATTITUDE, LOCAL_POSITION_NED, VFR_HUD); ArduPilot's log messages ATT, XKF1, NKF1, CTUN.
 """
 
-from collections import Counter
-from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Dict, Iterator, List, NamedTuple, Sequence, Tuple
 
@@ -13,7 +11,7 @@ import numpy as np
 from georeferencing.fixes import UNKNOWN_DEVIATION, Fix
 from node_support.errors import needed
 from node_support.geometry import pose_matrix, quaternion_of
-from recordings.bags.bag import RecordingError
+from recordings.bags.bag import RecordingError, first_bytes
 from recordings.motion.frame_tree import FrameTree
 from recordings.motion.pose_track import PoseTrack
 from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, linked
@@ -43,23 +41,14 @@ _FIXES, _FIX_3D = ("GPS_RAW_INT", "GPS"), 3
 _KINDS = {**_ATTITUDES, **_POSITIONS, **_DEPTHS}
 
 
-@dataclass
-class _Rows:
-    """Times [s] and values of the messages of one type of one vehicle."""
-
-    times: List[float] = field(default_factory=list)
-    values: List[List[float]] = field(default_factory=list)
+_Rows = List[Tuple[float, List[float]]]
+"""Times [s] and values of the messages of one type of one vehicle."""
 
 
 def is_autopilot_log(path: Path) -> bool:
     """Return whether a file is a log of an autopilot: telemetry by its name, DataFlash by its first bytes too."""
-    if path.suffix.lower() == _TELEMETRY:
-        return True
-    try:
-        with path.open("rb") as file:
-            return path.suffix.lower() in _FLASH and file.read(2) == _FLASH_START
-    except OSError:
-        return False
+    ending = path.suffix.lower()
+    return ending == _TELEMETRY or (ending in _FLASH and first_bytes(path, 2) == _FLASH_START)
 
 
 def motion_of_autopilot(path: Path, names: MotionNames) -> Motion:
@@ -71,15 +60,15 @@ def motion_of_autopilot(path: Path, names: MotionNames) -> Motion:
     attitude = next((rows[kind] for kind in _ATTITUDES if kind in rows), None)
     if attitude is None:
         raise RecordingError(f"{path}: no attitude in it; it holds {', '.join(rows) or 'nothing that is known'}")
-    times = np.array(attitude.times)
-    turns = np.array([quaternion_of(pose_matrix((0.0, 0.0, 0.0), angles)) for angles in attitude.values])
+    times = np.array([time for time, _ in attitude])
+    turns = np.array([quaternion_of(pose_matrix((0.0, 0.0, 0.0), angles)) for _, angles in attitude])
     kind, places = _places(rows, times)
     track = PoseTrack.sorted_from(np.round(times * 1e9).astype(np.int64), places, turns).turned_up()
     source = MotionSource.HEADING if kind in _DEPTHS or not kind else MotionSource.POSES
     known = f", positions of {kind}" if source is MotionSource.POSES else f", depth of {kind}" if kind else ""
     unused = f"; {fixes} GPS fixes, for map_bag --origin fixes" if fixes else ""
     note = f"{source.value} from {path.name}: {len(track)} attitudes{known}{unused}"
-    return Motion(linked(FrameTree(), replace(names, z_is_down=False), track), source, [note])
+    return Motion(linked(FrameTree(), names, track), source, [note])
 
 
 def fixes_of_autopilot(path: Path) -> List[Fix]:
@@ -99,14 +88,12 @@ def _places(rows: Dict[str, _Rows], times: np.ndarray) -> Tuple[str, np.ndarray]
     """Return the type of messages that tell places, "" where none does, and the places (n, 3), north, east, down."""
     for kind in (*_POSITIONS, *_DEPTHS):
         if kind in rows:
-            values = np.array(rows[kind].values)
+            known, values = map(np.array, zip(*sorted(rows[kind], key=lambda row: row[0])))
             if kind in _DEPTHS:
                 values = np.column_stack([np.zeros((len(values), 2)), values])
             elif np.ptp(values[:, :2], axis=0).max() < _STILL:
                 continue
-            order = np.argsort(rows[kind].times, kind="stable")
-            known = np.array(rows[kind].times)[order]
-            return kind, np.column_stack([np.interp(times, known, axis) for axis in values[order].T])
+            return kind, np.column_stack([np.interp(times, known, axis) for axis in values.T])
     return "", np.zeros((len(times), 3))
 
 
@@ -124,11 +111,8 @@ def _rows(path: Path) -> Tuple[Dict[str, _Rows], int]:
         if (fields.core and getattr(message, fields.core, 0) != 0) or not np.isfinite(values).all():
             continue
         own = vehicles.setdefault(message.get_srcSystem() if hasattr(message, "get_srcSystem") else 0, {})
-        rows = own.setdefault(kind, _Rows())
-        rows.times.append(message._timestamp)
-        rows.values.append(values)
-    counts = Counter({number: max(len(rows.times) for rows in own.values()) for number, own in vehicles.items()})
-    return (vehicles[counts.most_common(1)[0][0]] if vehicles else {}), fixes
+        own.setdefault(kind, []).append((message._timestamp, values))
+    return max(vehicles.values(), key=lambda own: max(map(len, own.values())), default={}), fixes
 
 
 def _messages(path: Path, kinds: Sequence[str]) -> Iterator[Any]:

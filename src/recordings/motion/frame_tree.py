@@ -49,7 +49,8 @@ class FrameTree:
         waiting = deque([target])
         while waiting:
             frame = waiting.popleft()
-            for neighbour in self._neighbours(frame):
+            linked = (link for link in self.tracks if frame in link)
+            for neighbour in (child if parent == frame else parent for parent, child in linked):
                 if neighbour not in came_from:
                     came_from[neighbour] = frame
                     waiting.append(neighbour)
@@ -95,9 +96,6 @@ class FrameTree:
                 return f"{child} in {parent} is known from {first:.2f} to {last:.2f} s, not at {asked:.2f} s"
         return ""
 
-    def _neighbours(self, frame: str) -> List[str]:
-        return [other for link in self.tracks if frame in link for other in link if other != frame]
-
     def _link(self, step: Link) -> Tuple[Link, bool]:
         """Return the link that a step passes, and whether it goes from parent to child."""
         return (step, True) if step in self.tracks else (step[::-1], False)
@@ -121,7 +119,8 @@ def pose_track(messages: Iterable[Any]) -> PoseTrack:
 
     Raises AttributeError for messages that have no pose.
     """
-    return _track([_sample(message) for message in messages])
+    poses = ((one.header, getattr(one.pose, "pose", one.pose)) for one in messages)
+    return _track([(stamp_ns(header), _vector(pose.position), _rotation(pose.orientation)) for header, pose in poses])
 
 
 def heading_track(messages: Iterable[Any]) -> PoseTrack:
@@ -148,11 +147,6 @@ def _links(messages: Iterable[Any]) -> Dict[Link, PoseTrack]:
                 pose = _vector(one.transform.translation), _rotation(one.transform.rotation)
                 samples.setdefault(link, []).append((stamp_ns(one.header), *pose))
     return {link: _track(found) for link, found in samples.items()}
-
-
-def _sample(message: Any) -> _Sample:
-    pose = getattr(message.pose, "pose", message.pose)
-    return stamp_ns(message.header), _vector(pose.position), _rotation(pose.orientation)
 
 
 def _track(samples: List[_Sample]) -> PoseTrack:

@@ -11,21 +11,11 @@ from recordings.motion.frame_tree import FrameTree
 from recordings.motion.pose_track import FARTHEST, PoseTrack
 from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, linked
 
-COLUMNS = {
-    "time": "s, of the same clock as the beams",
-    "x": "m, east or any other fixed direction",
-    "y": "m, to the left of x",
-    "z": "m, up",
-    "yaw": "rad, counter-clockwise from x",
-    "yaw_deg": "degrees, counter-clockwise from x",
-    "heading_deg": "degrees, clockwise from north, as a compass counts",
-    "depth": "m, down",
-}
-"""Columns that are read, by the names in the first line; others are left out."""
-
+_COLUMNS = ("time", "x", "y", "z", "yaw", "yaw_deg", "heading_deg", "depth")  # docs/map_bag.md; others are left out
 _GREATEST = {"time": 2.0**31}  # s: from there on ROS 1 has no stamps
 _SUFFIXES = (".csv", ".txt", ".tsv")
-_HEADINGS = ("yaw", "yaw_deg", "heading_deg")
+_HEADINGS = {"yaw": np.array, "yaw_deg": np.radians, "heading_deg": lambda degrees: np.pi / 2.0 - np.radians(degrees)}
+"""Columns of which one tells the yaw, and how, rad."""
 
 
 def is_table(path: Path) -> bool:
@@ -51,9 +41,9 @@ def rows_of(path: Path) -> Iterator[List[str]]:
 
 
 def motion_of_csv(path: Path, names: MotionNames) -> Motion:
-    """Return the motion in a table with columns of `COLUMNS`: `time`, one of the headings, and x and y if known.
+    """Return the motion in a table with `time` [s], one of the headings, and where known x, y to its left and z up [m].
 
-    Raises RecordingError, with path and line, for a table that cannot be used.
+    A yaw counts counter-clockwise from x. Raises RecordingError, with path and line, for a table that cannot be used.
     """
     table = _read(path)
     headings = [name for name in _HEADINGS if name in table]
@@ -66,22 +56,17 @@ def motion_of_csv(path: Path, names: MotionNames) -> Motion:
     zeros = np.zeros(len(times))
     heights = table.get("z", -table["depth"] if "depth" in table else zeros)
     places = np.column_stack([table.get("x", zeros), table.get("y", zeros), heights])
-    yaws = _yaws(headings[0], table[headings[0]])
+    yaws = _HEADINGS[headings[0]](table[headings[0]])
     turns = np.column_stack([zeros, zeros, np.sin(yaws / 2.0), np.cos(yaws / 2.0)])
     track = PoseTrack.sorted_from(np.round(times * 1e9).astype(np.int64), places, turns)
     source = MotionSource.POSES if "x" in table else MotionSource.HEADING
-    return Motion(linked(FrameTree(), names, track), source, [f"{source.value} from {path.name}: {len(track)} rows"])
-
-
-def _yaws(column: str, values: np.ndarray) -> np.ndarray:
-    if column == "heading_deg":
-        return np.pi / 2.0 - np.radians(values)
-    return np.radians(values) if column == "yaw_deg" else values
+    tree = linked(FrameTree(), names, names.upward(track))
+    return Motion(tree, source, [f"{source.value} from {path.name}: {len(track)} rows"])
 
 
 def _read(path: Path) -> Dict[str, np.ndarray]:
     names, *rows = rows_of(path)
-    kept = [(index, name) for index, name in enumerate(names) if name in COLUMNS]
+    kept = [(index, name) for index, name in enumerate(names) if name in _COLUMNS]
     lines = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
     if len(lines) < 2:
         raise RecordingError(f"{path}: {len(lines)} rows; needs at least 2")

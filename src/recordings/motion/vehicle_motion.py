@@ -1,8 +1,10 @@
 """Where the vehicle was, as far as a recording tells: poses, velocities along a heading, a heading, or nothing."""
 
-from dataclasses import dataclass, field, replace
+from collections import deque
+from contextlib import suppress
+from dataclasses import dataclass, field
 from enum import Enum
-from typing import Dict, List, NamedTuple, Optional, Tuple
+from typing import Dict, List, Optional, Tuple
 
 import numpy as np
 
@@ -43,6 +45,10 @@ class MotionNames:
     declared: Optional[MotionSource] = None
     z_is_down: bool = False
 
+    def upward(self, track: PoseTrack) -> PoseTrack:
+        """Return poses that are counted as those of the recording with z up."""
+        return track.turned_up() if self.z_is_down else track
+
 
 @dataclass(frozen=True)
 class Motion:
@@ -61,8 +67,10 @@ def motion_of_bag(bag: Bag, names: MotionNames, truth: Optional[str] = None) -> 
     tree = frame_tree(bag)
     if names.declared is not None:
         return declared_motion(tree, names)
-    if names.odometry is None and tree.links_between(names.odom_frame, names.base_frame) is not None:
-        return Motion(_upward(tree, names), MotionSource.POSES)
+    link = (names.odom_frame, names.base_frame)
+    if names.odometry is None and tree.links_between(*link) is not None:
+        turned = tree.with_track(*link, names.upward(tree.tracks[link])) if link in tree.tracks else tree
+        return Motion(turned, MotionSource.POSES)
     topic = names.odometry or _likeliest(bag, Role.ODOMETRY, truth)
     if topic is not None and not _is_of_velocities(bag, topic):
         return _of_poses(bag, tree, topic, names)
@@ -93,17 +101,9 @@ def declared_motion(tree: FrameTree, names: MotionNames) -> Motion:
 
 
 def linked(tree: FrameTree, names: MotionNames, track: PoseTrack) -> FrameTree:
-    """Return a tree whose vehicle moves as `track` alone, poses of the base frame in odom, which may have z down."""
-    track = track.turned_up() if names.z_is_down else track
+    """Return a tree whose vehicle moves as `track` alone, poses of the base frame in odom."""
     base_links = {link: one for link, one in tree.tracks.items() if link[1] != names.base_frame}
     return FrameTree(base_links).with_track(names.odom_frame, names.base_frame, track)
-
-
-def _upward(tree: FrameTree, names: MotionNames) -> FrameTree:
-    link = (names.odom_frame, names.base_frame)
-    if names.z_is_down and link in tree.tracks:
-        return tree.with_track(*link, tree.tracks[link].turned_up())
-    return tree
 
 
 def _of_poses(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
@@ -119,7 +119,7 @@ def _of_poses(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Moti
         ) from None
     if not len(track):
         raise RecordingError(f"none of the {len(messages)} messages of {topic} holds a pose with a rotation")
-    tree = linked(tree, names, track)
+    tree = linked(tree, names, names.upward(track))
     child = frame_name(getattr(messages[0], "child_frame_id", ""))
     if child and child != names.base_frame and names.base_frame not in frame_tree(bag).frames:
         tree = tree.with_track(names.base_frame, child, PoseTrack.fixed(_NO_SHIFT, _NO_TURN))
@@ -132,7 +132,7 @@ def _of_heading(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Mo
     if track is None:
         raise RecordingError(f"{_nothing(bag, tree, names)}; {topic} holds no orientation either")
     note = f"no odometry: heading from {topic} ({bag.topics[topic].type}), the position is unknown"
-    return Motion(linked(tree, names, track), MotionSource.HEADING, [note])
+    return Motion(linked(tree, names, names.upward(track)), MotionSource.HEADING, [note])
 
 
 def _of_velocity(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Motion:
@@ -142,16 +142,15 @@ def _of_velocity(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> M
     heading, headings = next(((name, track) for name, track in tracks if track is not None), (None, None))
     if headings is None:
         raise RecordingError(f"{_nothing(bag, tree, names)}; {topic} holds velocities, but no topic holds a heading")
-    upward = replace(names, z_is_down=False)
-    found = velocities_of(bag, topic, tree, names.base_frame, names.z_is_down)
-    if not len(found.stamps_ns):
-        raise RecordingError(f"none of the {found.refused} messages of {topic} holds a velocity")
+    found, refused = _velocities(bag, topic, tree, names)
+    if not found:
+        raise RecordingError(f"none of the {refused} messages of {topic} holds a velocity")
+    longest_gap = float(np.diff([stamp_ns for stamp_ns, *_ in found]).max(initial=0)) * 1e-9
     note = (
-        f"odometry from {len(found.stamps_ns)} velocities of {topic} ({bag.topics[topic].type}) along the heading of "
-        f"{heading}; they are at most {found.longest_gap:.1f} s apart, and {found.refused} messages hold none"
+        f"odometry from {len(found)} velocities of {topic} ({bag.topics[topic].type}) along the heading of "
+        f"{heading}; they are at most {longest_gap:.1f} s apart, and {refused} messages hold none"
     )
-    track = reckoned(found, headings.turned_up() if names.z_is_down else headings)
-    return Motion(linked(tree, upward, track), MotionSource.VELOCITY, [note])
+    return Motion(linked(tree, names, _reckoned(found, names.upward(headings))), MotionSource.VELOCITY, [note])
 
 
 def _is_of_velocities(bag: Bag, topic: str) -> bool:
@@ -174,7 +173,7 @@ def _headings(bag: Bag, tree: FrameTree, topic: str, names: MotionNames) -> Opti
         return None
     if not len(track):
         return None
-    mount = fixed_pose(tree, names.base_frame, frame_name(messages[0].header.frame_id))
+    mount = _fixed_pose(tree, names.base_frame, frame_name(messages[0].header.frame_id))
     return track if mount is None or hasattr(messages[0], "pose") else track.mounted(mount)
 
 
@@ -192,32 +191,18 @@ def _nothing(bag: Bag, tree: FrameTree, names: MotionNames) -> str:
     )
 
 
-class Velocities(NamedTuple):
-    """stamps_ns: (n,) increasing. values: (n, 3) m/s along the vehicle's axes. places: (n, 2) m, of the instrument.
-
-    refused: how many messages said none.
-    """
-
-    stamps_ns: np.ndarray
-    values: np.ndarray
-    places: np.ndarray
-    refused: int
-
-    @property
-    def longest_gap(self) -> float:
-        """Longest time between two of them, s."""
-        return float(np.diff(self.stamps_ns).max()) * 1e-9 if len(self.stamps_ns) > 1 else 0.0
+_Velocity = Tuple[int, np.ndarray, np.ndarray]
+"""Stamp, ns; (3,) m/s along the vehicle's axes; (2,) m, place of the instrument."""
 
 
-def velocities_of(bag: Bag, topic: str, tree: FrameTree, base_frame: str, is_downward: bool) -> Velocities:
-    """Return what a topic of one of `VELOCITY_TYPES` says; may be empty.
+def _velocities(bag: Bag, topic: str, tree: FrameTree, names: MotionNames) -> Tuple[List[_Velocity], int]:
+    """Return what a topic of one of `VELOCITY_TYPES` says, sorted by time, and how many messages say nothing.
 
     tree: tells how the instrument is mounted; one that it does not place is taken as mounted straight at the origin.
-    is_downward: axes of the vehicle's own frame count ahead, right, down.
     """
     kind = VELOCITY_TYPES[bag.topics[topic].type]
-    rows: List[Tuple[int, np.ndarray, np.ndarray]] = []
-    mounts: Dict[str, Optional[np.ndarray]] = {base_frame: None}
+    rows: List[_Velocity] = []
+    mounts: Dict[str, Optional[np.ndarray]] = {names.base_frame: None}
     refused = 0
     for time, message in bag.messages(topic):
         try:
@@ -226,37 +211,26 @@ def velocities_of(bag: Bag, topic: str, tree: FrameTree, base_frame: str, is_dow
             refused += 1
             continue
         if fields.frame_id not in mounts:
-            mounts[fields.frame_id] = fixed_pose(tree, base_frame, fields.frame_id)
-        rows.append((fields.stamp_ns or time, *kind.in_vehicle(fields, mounts[fields.frame_id], is_downward)))
-    rows.sort(key=lambda row: row[0])
-    stamps, values, places = zip(*rows) if rows else ((), (), ())
-    return Velocities(
-        np.array(stamps, dtype=np.int64), np.array(values).reshape(-1, 3), np.array(places).reshape(-1, 2), refused
-    )
+            mounts[fields.frame_id] = _fixed_pose(tree, names.base_frame, fields.frame_id)
+        rows.append((fields.stamp_ns or time, *kind.in_vehicle(fields, mounts[fields.frame_id], names.z_is_down)))
+    return sorted(rows, key=lambda row: row[0]), refused
 
 
-def fixed_pose(tree: FrameTree, target: str, source: str) -> Optional[np.ndarray]:
+def _fixed_pose(tree: FrameTree, target: str, source: str) -> Optional[np.ndarray]:
     """Return T_target_source (4, 4), which does not change; None where the tree does not link the frames."""
     if tree.links_between(target, source) is None:
         return None
     return tree.poses(target, source, np.zeros(1, dtype=np.int64))[0][0]
 
 
-def reckoned(velocities: Velocities, headings: PoseTrack) -> PoseTrack:
+def _reckoned(velocities: List[_Velocity], headings: PoseTrack) -> PoseTrack:
     """Return T_odom_base at the stamps of headings (n > 0), from (0, 0)."""
     reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=VelocitySource.MEASURED))
     rotations = headings.at(headings.stamps_ns)[:, :3, :3]
-    positions, following = np.empty((len(headings), 3)), 0
+    positions, waiting = np.empty((len(headings), 3)), deque(velocities)
     for index, stamp_ns in enumerate(map(int, headings.stamps_ns)):
-        while following < len(velocities.stamps_ns) and velocities.stamps_ns[following] <= stamp_ns:
-            _take(reckoner, velocities, following)
-            following += 1
+        while waiting and waiting[0][0] <= stamp_ns:
+            with suppress(RefusedInput):
+                reckoner.take_velocity(*waiting.popleft())
         positions[index] = reckoner.take_orientation(stamp_ns, rotations[index]).T_odom_base[:3, 3]
     return PoseTrack(headings.stamps_ns, positions, headings.rotations)
-
-
-def _take(reckoner: DeadReckoner, velocities: Velocities, index: int) -> None:
-    try:
-        reckoner.take_velocity(int(velocities.stamps_ns[index]), velocities.values[index], velocities.places[index])
-    except RefusedInput:
-        return
