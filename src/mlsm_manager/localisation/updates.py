@@ -14,7 +14,7 @@ from mlsm_manager.surface_map.free_space import CarveReport
 from mlsm_manager.surface_map.insertion import InsertReport
 from node_support.health import Health
 
-NOTHING_INSERTED = InsertReport(0, 0, 0)
+NOTHING_INSERTED = InsertReport(0, 0)
 _PROVISIONAL = "provisional: one scan of an unknown velocity; the next ones draw it anew"
 
 

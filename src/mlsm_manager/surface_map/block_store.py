@@ -47,7 +47,7 @@ class CellIndex:
     tiles spend more memory on empty cells than the blocks themselves take. Doubling takes some hundredths of a second
     at a million cells.
 
-    heads: (s,) the number of the first block of the cell in each place, NO_BLOCK where there is none.
+    keys: (s,) of the cell in each place. heads: (s,) the number of its first block, NO_BLOCK where there is none.
     """
 
     def __init__(self, expected_cells: int) -> None:
@@ -56,39 +56,31 @@ class CellIndex:
     def _begin(self, cells: int) -> None:
         """Begin an empty table with room for so many cells, whose number of places is a power of two."""
         places = max(_FEWEST_PLACES, 1 << int(np.ceil(cells / _MOST_LOAD)).bit_length())
-        self._keys, self.heads = np.full(places, _EMPTY), np.full(places, NO_BLOCK, dtype=np.int32)
+        self.keys, self.heads = np.full(places, _EMPTY), np.full(places, NO_BLOCK, dtype=np.int32)
         self._used = 0
-
-    @property
-    def nbytes(self) -> int:
-        """Memory held, bytes."""
-        return self._keys.nbytes + self.heads.nbytes
 
     def slots(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int64 places in `heads`, making those that are new; keys is (n,) and holds none twice.
 
         Places are good until the next call.
         """
-        most = _MOST_LOAD * len(self._keys)
+        most = _MOST_LOAD * len(self.keys)
         if self._used + len(keys) > most:
-            cells = self._used + np.count_nonzero(_found(keys, self._keys) < 0)
+            cells = self._used + np.count_nonzero(_found(keys, self.keys) < 0)
             if cells > most:
-                self._grow(cells)
-        places, new = _placed(keys, self._keys)
+                taken = self.keys != _EMPTY
+                held_keys, heads = self.keys[taken], self.heads[taken]
+                self._begin(cells)
+                held_places, self._used = _placed(held_keys, self.keys)
+                self.heads[held_places] = heads
+        places, new = _placed(keys, self.keys)
         self._used += new
         return places
 
     def find(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
-        places = _found(np.ascontiguousarray(keys), self._keys)
+        places = _found(np.ascontiguousarray(keys), self.keys)
         return np.where(places >= 0, self.heads[places], np.int32(NO_BLOCK))
-
-    def _grow(self, cells: int) -> None:
-        taken = self._keys != _EMPTY
-        keys, heads = self._keys[taken], self.heads[taken]
-        self._begin(cells)
-        places, self._used = _placed(keys, self._keys)
-        self.heads[places] = heads
 
 
 @compiled()
@@ -148,8 +140,8 @@ class BlockStore:
     @property
     def nbytes(self) -> int:
         """Memory in use, bytes; rows beyond those are reserved but never touched, so that they cost nothing yet."""
-        arrays = self._rows, self._following, self._crossed
-        return self._used * sum(array[0].nbytes for array in arrays) + self._index.nbytes
+        of_row = sum(array[0].nbytes for array in (self._rows, self._following, self._crossed))
+        return self._used * of_row + self._index.keys.nbytes + self._index.heads.nbytes
 
     @property
     def rows_in_use(self) -> np.ndarray:
@@ -215,11 +207,10 @@ class BlockStore:
 
     def _release(self, rows: np.ndarray) -> None:
         """Give back rows (n,), to which no cell may lead afterwards."""
-        if not len(rows):
-            return
-        self._announce(rows)
-        self._rows[rows, COUNT] = 0.0
-        self._free = np.concatenate([self._free, rows])
+        if len(rows):
+            self._announce(rows)
+            self._rows[rows, COUNT] = 0.0
+            self._free = np.concatenate([self._free, rows])
 
     def _take(self, number: int) -> np.ndarray:
         """Return the numbers (number,) of rows that are free now, growing where none are."""

@@ -21,9 +21,8 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.geometry import members
 from node_support.parameters import ParameterSet, parameter
 
-_MOST_POINTS = 50
-"""More points make a block no surer: a ship that lay there for an hour has left once it is not heard any more."""
-_ENOUGH = 5  # so many crossings make a cell as free as it gets: OctoMap's cells too reach their limit after five misses
+_MOST_POINTS = 50  # more make a block no surer: a ship that lay there for an hour has left once it is not heard
+_ENOUGH = 5  # crossings make a cell as free as it gets, as in OctoMap
 
 
 @dataclass(frozen=True)
@@ -67,14 +66,6 @@ class BeamPaths:
     beam: np.ndarray
     distance: np.ndarray
     height: np.ndarray
-
-    def take(self, chosen: np.ndarray) -> "BeamPaths":
-        """Return the chosen pairs, a mask (p,), and the cells that are left."""
-        old = self.cell[chosen]
-        starts, cell = _runs(old)
-        return BeamPaths(
-            self.cells[old[starts]], starts, cell, self.beam[chosen], self.distance[chosen], self.height[chosen]
-        )
 
 
 def beam_paths(beams: FirstEchoes, width: float, resolution: float) -> BeamPaths:
@@ -217,7 +208,7 @@ class Carver:
         before = (paths.distance < first[paths.beam]) & ~hit[paths.cell]
         number = np.bincount(block[crossing], minlength=len(rows))
         crossed = np.flatnonzero(number)
-        free = _free_blocks(paths.take(before), occupied.resolution)
+        free = _free_blocks(paths.cells, paths.cell[before], paths.height[before], occupied.resolution)
         return BeamFindings(free, blocks.take(crossed), rows[crossed], number[crossed])
 
     def is_outworn(self, blocks: Blocks, crossings: np.ndarray) -> np.ndarray:
@@ -249,14 +240,15 @@ def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> Blocks:
     return new
 
 
-def _free_blocks(paths: BeamPaths, resolution: float) -> Blocks:
-    """Return one block per cell, with the heights of the axes that crossed it."""
-    rows = np.zeros((len(paths.cells), ROW_WIDTH))
-    if not len(rows):
+def _free_blocks(cells: np.ndarray, cell: np.ndarray, height: np.ndarray, resolution: float) -> Blocks:
+    """Return one block for each of the `cells` (c, 2) that beams crossed: `cell` (p,), sorted, at `height` (p,) m."""
+    if not len(cell):
         return Blocks.none(resolution)
-    rows[:, :2] = (paths.cells + 0.5) * resolution
-    rows[:, COUNT] = np.diff(np.append(paths.starts, len(paths.cell)))
-    rows[:, BOTTOM] = np.minimum.reduceat(paths.height, paths.starts)
-    rows[:, TOP] = np.maximum.reduceat(paths.height, paths.starts)
+    starts, _ = _runs(cell)
+    rows = np.zeros((len(starts), ROW_WIDTH))
+    rows[:, :2] = (cells[cell[starts]] + 0.5) * resolution
+    rows[:, COUNT] = np.diff(np.append(starts, len(cell)))
+    rows[:, BOTTOM] = np.minimum.reduceat(height, starts)
+    rows[:, TOP] = np.maximum.reduceat(height, starts)
     rows[:, 2] = (rows[:, BOTTOM] + rows[:, TOP]) / 2.0
     return Blocks.uncrossed(rows, resolution)

@@ -7,7 +7,7 @@ the end does not depend on the order in which the points came. So a whole scan i
 
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import NamedTuple, Tuple
+from typing import Tuple
 
 import numpy as np
 
@@ -19,37 +19,29 @@ _VALUES = 4  # mean of x y z and strength, then as many sums of squares: the fir
 _FINITE = np.finfo(np.float64).max
 
 
-class Groups(NamedTuple):
-    """Intervals of height in cells, sorted by cell, then by bottom.
-
-    rows: (g, ROW_WIDTH) as Blocks has them. cell: (g,) int64 index of the cell. crossed: (g,) uint16 number of beams
-    that crossed it since a point last fell into it.
-    """
-
-    rows: np.ndarray
-    cell: np.ndarray
-    crossed: np.ndarray
+_Groups = Tuple[np.ndarray, np.ndarray, np.ndarray]
+"""Intervals of height in cells, sorted by cell, then by bottom: rows (g, ROW_WIDTH) as Blocks has them, index of the
+cell (g,) int64, and crossings (g,) uint16."""
 
 
 @dataclass(frozen=True)
 class InsertReport:
-    """What became of the points of one insertion."""
+    """Points of one insertion: `inserted`, and `outside` the limit."""
 
     inserted: int
-    not_finite: int
     outside: int
 
 
 def admitted(points: np.ndarray, limit: float) -> Tuple[np.ndarray, InsertReport]:
-    """Return which points (n, 4) are finite and have no coordinate beyond `limit` [m], and what became of all."""
+    """Return which points (n, 4) are finite and have no coordinate beyond `limit` [m], and how many."""
     kept, not_finite = _finite_within(np.ascontiguousarray(points, dtype=np.float64), limit)
-    return kept, InsertReport(len(kept), not_finite, len(points) - len(kept) - not_finite)
+    return kept, InsertReport(len(kept), len(points) - len(kept) - not_finite)
 
 
 def blocks_of(points: np.ndarray, resolution: float, limit: float = np.inf) -> Blocks:
     """Return the blocks that points (n, 4) make in an empty map; `limit`: see `admitted`."""
-    _, groups = _grouped_points(admitted(points, limit)[0], resolution)
-    return Blocks(groups.rows, resolution, groups.crossed)
+    _, (rows, _, crossed) = _grouped_points(admitted(points, limit)[0], resolution)
+    return Blocks(rows, resolution, crossed)
 
 
 def insert_points(store: BlockStore, points: np.ndarray) -> np.ndarray:
@@ -65,13 +57,13 @@ def insert_blocks(store: BlockStore, blocks: Blocks) -> np.ndarray:
     rows = blocks.rows.astype(np.float64, copy=False)
     cells, order, starts = _sorted_by_cell(blocks.keys, rows[:, BOTTOM])
     owner = np.repeat(np.arange(len(cells)), np.diff(starts))
-    _insert_groups(store, cells, Groups(rows[order], owner, blocks.crossed[order]))
+    _insert_groups(store, cells, (rows[order], owner, blocks.crossed[order]))
     return cells
 
 
-def _insert_groups(store: BlockStore, cells: np.ndarray, groups: Groups) -> None:
+def _insert_groups(store: BlockStore, cells: np.ndarray, groups: _Groups) -> None:
     slots, held = store.places(cells)
-    runs, fused = _merged_runs(tuple(groups), held, slots, store.resolution)
+    runs, fused = _merged_runs(groups, held, slots, store.resolution)
     store.write(slots, runs, fused)
 
 
@@ -91,11 +83,11 @@ def compile_loops() -> None:
 
 @compiled()
 def _merged_runs(groups, held, slots, resolution):
-    """Return the Runs of the cells at `slots` (c,) after the Groups went into them, each cell at least one, and the row
+    """Return the Runs of the cells at `slots` (c,) after _Groups went into them, each cell at least one, and the row
     numbers (f,) of stored blocks that are part of others by then.
 
-    groups: their members. held: the store's arrays. A merged block keeps the highest row of its parts. What is new
-    resets its crossings: a beam has just hit it.
+    held: the store's arrays. A merged block keeps the highest row of its parts. What is new resets its crossings: a
+    beam has just hit it.
     """
     (group_rows, group_cells, group_crossed), (rows, following, _, heads) = groups, held
     most = len(group_rows) + _stored_count(following, heads, slots)
@@ -214,10 +206,10 @@ def _finite_within(points, limit):
     return kept[:number], not_finite
 
 
-def _grouped_points(points: np.ndarray, resolution: float) -> Tuple[np.ndarray, Groups]:
-    """Return the keys (c,) of the cells of points (n, 4), sorted, and the Groups that the points make by themselves."""
+def _grouped_points(points: np.ndarray, resolution: float) -> Tuple[np.ndarray, _Groups]:
+    """Return the keys (c,) of the cells of points (n, 4), sorted, and the _Groups that they make by themselves."""
     cells, order, starts = _sorted_by_cell(keys_of(points, resolution), points[:, 2])
-    return cells, Groups(*_split_at_gaps(points, order, starts, resolution))
+    return cells, _split_at_gaps(points, order, starts, resolution)
 
 
 def _sorted_by_cell(cell: np.ndarray, height: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -232,7 +224,7 @@ def _sorted_by_cell(cell: np.ndarray, height: np.ndarray) -> Tuple[np.ndarray, n
 
 @compiled()
 def _split_at_gaps(points, order, starts, resolution):
-    """Return the members of the Groups of points (n, 4) that are sorted by cell; order, starts: see _sorted_by_cell."""
+    """Return the _Groups of points (n, 4) that are sorted by cell; order, starts: see _sorted_by_cell."""
     rows, owner = np.empty((len(points), ROW_WIDTH)), np.empty(len(points), np.int64)
     groups = 0
     for number in range(len(starts) - 1):

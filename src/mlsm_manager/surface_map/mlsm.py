@@ -6,17 +6,14 @@ from typing import Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore, RunningCopy
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, TOP, Blocks, cell_keys, cells_of, cells_of_keys
+from mlsm_manager.surface_map.blocks import BOTTOM, TOP, Blocks, cell_keys, cells_of, cells_of_keys
 from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
 from node_support.geometry import grid
 
 _EXTENT = [0, 1, BOTTOM, TOP]  # columns of a block that tell where it lies
 
-TILE_BITS = 4
-"""A tile has 2 ** 4 = 16 cells on a side: 8 m at 0.5 m. Larger ones repeat more that did not change, smaller ones make
-more markers than rviz draws fluidly."""
-_MOST_PARTS = 64
-"""So many insertions are noted before what they changed is put together; it bounds the memory of a map unasked."""
+TILE_BITS = 4  # 16 cells on a side of a tile: larger ones repeat more that did not change, smaller ones slow rviz
+_MOST_PARTS = 64  # insertions that are noted before what they changed is put together: it bounds memory
 
 
 class ChangedTiles:
@@ -62,7 +59,7 @@ class MultiLevelSurfaceMap:
 
     @property
     def nbytes(self) -> int:
-        """Memory in use, bytes; what is reserved but not touched yet costs nothing and is not counted."""
+        """Memory in use, bytes; what is reserved but not touched yet costs nothing."""
         return self._store.nbytes
 
     @property
@@ -83,7 +80,12 @@ class MultiLevelSurfaceMap:
         if not (low <= high).all():
             return self._store.blocks(np.empty(0, dtype=np.int64))
         first, last = cells_of(np.clip([low, high], -self.limit, self.limit), self.resolution)
-        return self._in_cells(first, last).in_box(low, high)
+        width = last - first + 1
+        if int(width[0]) * int(width[1]) > len(self):
+            return self.blocks.in_box(low, high)
+        x, y = (np.arange(width[axis]) + first[axis] for axis in (0, 1))
+        rows, _ = self._store.find(((x << 32)[:, np.newaxis] + y).ravel())
+        return self._store.blocks(np.sort(rows)).in_box(low, high)
 
     def in_tiles(self, tiles: np.ndarray) -> Blocks:
         """Return a copy of the blocks of tiles (n, 2), none twice, as `take_changed_tiles` names them."""
@@ -128,9 +130,8 @@ class MultiLevelSurfaceMap:
 
     def remove(self, rows: np.ndarray) -> None:
         """Forget the blocks in `rows` (n,), none twice."""
-        if not len(rows):
-            return
-        self._changed.note(self._store.remove(rows))
+        if len(rows):
+            self._changed.note(self._store.remove(rows))
 
     def insert(self, points: np.ndarray) -> InsertReport:
         """Insert points (n, 4), x y z [m] and strength, in the map's frame, as one batch.
@@ -141,29 +142,15 @@ class MultiLevelSurfaceMap:
         self._changed.note(insert_points(self._store, kept))
         return report
 
-    def insert_blocks(self, blocks: Blocks) -> InsertReport:
+    def insert_blocks(self, blocks: Blocks) -> None:
         """Insert blocks of the same resolution; each goes where its mean lies, as if its points came with it.
 
-        The report counts points. Blocks with their mean, bottom or top beyond the limit are left out.
-        Raises ValueError for another resolution.
+        Blocks with their mean, bottom or top beyond the limit are left out. Raises ValueError for another resolution.
         """
         if blocks.resolution != self.resolution:
             raise ValueError(f"resolution {blocks.resolution:g} m: must be the map's, {self.resolution:g} m")
         kept = blocks.take(np.abs(blocks.rows[:, _EXTENT]).max(axis=1) <= self.limit)
         self._changed.note(insert_blocks(self._store, kept))
-        inserted, everything = (int(some.rows[:, COUNT].sum()) for some in (kept, blocks))
-        return InsertReport(inserted, 0, everything - inserted)
-
-    def _in_cells(self, first: np.ndarray, last: np.ndarray) -> Blocks:
-        """Return the blocks of cells from `first` to `last`, (2,) each, both included, sorted by row."""
-        width = np.maximum(last - first + 1, 0)
-        if int(width[0]) * int(width[1]) > len(self._store):
-            blocks = self.blocks
-            return blocks.take(((blocks.cells >= first) & (blocks.cells <= last)).all(axis=1))
-        x, y = np.arange(first[0], last[0] + 1), np.arange(first[1], last[1] + 1)
-        keys = ((x << 32)[:, np.newaxis] + y).ravel()
-        rows, _ = self._store.find(keys)
-        return self._store.blocks(np.sort(rows))
 
 
 @dataclass(frozen=True)
@@ -197,7 +184,6 @@ class Overlay:
 
     @property
     def covered(self) -> Covered:
-        """What the changed cells held before."""
         return Covered(cells_of_keys(self._cells), self._held.rows, self._held.crossed)
 
     def lay(self, blocks: Blocks) -> None:
@@ -211,10 +197,9 @@ class Overlay:
 
     def take_off(self) -> None:
         """Give all changed cells what they held before."""
-        if not len(self._cells):
-            return
-        self.covered.uncover(self._map)
-        self._forget()
+        if len(self._cells):
+            self.covered.uncover(self._map)
+            self._forget()
 
     def _remember(self, cells: np.ndarray) -> None:
         new = np.setdiff1d(cells, self._cells)

@@ -40,7 +40,7 @@ def test_a_point_that_is_not_finite_is_counted_and_left_out(column, value):
     points = np.array([[0.1, 0.1, 0, 1], [0.1, 0.1, 0, 1]], dtype=np.float32)
     points[1, column] = value
     mlsm = MultiLevelSurfaceMap(0.5)
-    assert mlsm.insert(points) == InsertReport(inserted=1, not_finite=1, outside=0)
+    assert mlsm.insert(points) == InsertReport(inserted=1, outside=0)
     assert mlsm.blocks.count.tolist() == [1]
 
 
@@ -50,7 +50,7 @@ def test_a_point_beyond_the_limit_is_counted_and_left_out(column, value):
     points = np.ones((2, 4))
     points[1, column] = value
     mlsm = MultiLevelSurfaceMap(0.5, limit=100.0)
-    assert mlsm.insert(points) == InsertReport(inserted=1, not_finite=0, outside=1)
+    assert mlsm.insert(points) == InsertReport(inserted=1, outside=1)
     assert len(mlsm) == 1
 
 
@@ -143,13 +143,13 @@ def test_blocks_of_another_resolution_are_refused():
         MultiLevelSurfaceMap(0.5).insert_blocks(random_map(resolution=0.25).blocks)
 
 
-def test_blocks_beyond_the_limit_are_counted_by_their_points():
+def test_blocks_beyond_the_limit_are_left_out():
     surface_map = MultiLevelSurfaceMap(0.5, limit=5.0)
     blocks = random_map(count=500).blocks
-    report = surface_map.insert_blocks(blocks)
-    assert report.outside > 0
-    assert report.inserted + report.outside == 500
-    assert int(surface_map.blocks.count.sum()) == report.inserted
+    surface_map.insert_blocks(blocks)
+    inside = np.abs(blocks.rows[:, [0, 1, 9, 10]]).max(axis=1) <= 5.0
+    assert 0 < inside.sum() < len(blocks)
+    assert partition(surface_map.blocks) == partition(blocks.take(inside))
 
 
 @given(st.integers(0, 2**31), st.lists(st.floats(-12, 12), min_size=4, max_size=4))

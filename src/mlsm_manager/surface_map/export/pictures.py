@@ -10,7 +10,7 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.boxes import THINNEST
-from mlsm_manager.surface_map.export.rasters import elevation
+from mlsm_manager.surface_map.export.rasters import box_around
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support.errors import needed
 from node_support.files import write_whole
@@ -95,9 +95,9 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = 
 
     if color_by is ColorBy.HEIGHT and blocks.is_flat:
         color_by = ColorBy.COUNT
-    pixels, origin, resolution = _pixels(blocks, free, color_by)
+    pixels, (left, bottom) = _pixels(blocks, free, color_by)
     rows, columns = pixels.shape[:2]
-    extent = (origin[0], origin[0] + columns * resolution, origin[1], origin[1] + rows * resolution)
+    extent = (left, left + columns * blocks.resolution, bottom, bottom + rows * blocks.resolution)
     figure = Figure(figsize=(_WIDTH_INCHES, np.clip(_WIDTH_INCHES * rows / max(columns, 1), 3.0, 30.0)), dpi=_DPI)
     FigureCanvasAgg(figure)
     axes = figure.add_subplot(1, 1, 1)
@@ -113,16 +113,14 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = 
     write_whole(path, picture.getvalue())
 
 
-def _pixels(blocks: Blocks, free: Blocks, color_by: ColorBy) -> tuple:
-    """Return (rows, columns, 3) colours, the origin (2,) m and the resolution, m."""
-    both = Blocks.joined([free, blocks])
-    raster = elevation(both)
-    pixels = np.ones((*raster.values.shape, 3))
-    low = np.rint(raster.origin / raster.resolution).astype(np.int64)
+def _pixels(blocks: Blocks, free: Blocks, color_by: ColorBy) -> Tuple[np.ndarray, np.ndarray]:
+    """Return (rows, columns, 3) colours, and the lower left corner (2,) m."""
+    low, shape = box_around(np.concatenate([free.cells, blocks.cells]))
+    pixels = np.ones((*shape, 3))
     pixels[tuple((free.cells - low).T[::-1])] = _FREE_COLOR
     order = np.argsort(blocks.height, kind="stable")
     pixels[tuple((blocks.cells[order] - low).T[::-1])] = block_colors(blocks, color_by)[order]
-    return pixels, raster.origin, raster.resolution
+    return pixels, low * blocks.resolution
 
 
 def has_screen() -> bool:

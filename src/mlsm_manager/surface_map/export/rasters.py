@@ -14,10 +14,8 @@ from mlsm_manager.surface_map.map_file import ExportError
 from node_support.files import write_whole
 
 UNKNOWN, FREE, OCCUPIED = -1, 0, 100
-_MOST_CELLS = 400_000_000
-"""A raster of more would take gigabytes: one point far off, at 0.01 m, asks for that; `map_tool crop` helps."""
-_GREY = {FREE: 254, UNKNOWN: 205, OCCUPIED: 0}
-"""What map_server (trinary mode) takes for free, unknown and occupied given `_THRESHOLDS`."""
+_MOST_CELLS = 400_000_000  # more would take gigabytes: one point far off, at 0.01 m, asks for that
+_GREY = {FREE: 254, UNKNOWN: 205, OCCUPIED: 0}  # as map_server (trinary mode) takes them given `_THRESHOLDS`
 _THRESHOLDS = {"negate": 0, "occupied_thresh": 0.65, "free_thresh": 0.196}
 _NO_DATA = -9999.0
 
@@ -40,7 +38,7 @@ def occupancy(occupied: Blocks, free: Blocks, low: float, high: float) -> Raster
     Blocks count that reach into the slice with any part. Raises ExportError for a raster that is too large.
     """
     layers = [blocks.take((blocks.height >= low) & (blocks.bottom <= high)) for blocks in (free, occupied)]
-    low_cell, shape = _box_around(np.concatenate([blocks.cells for blocks in layers]))
+    low_cell, shape = box_around(np.concatenate([blocks.cells for blocks in layers]))
     values = np.full(shape, UNKNOWN, dtype=np.int8)
     for blocks, value in zip(layers, (FREE, OCCUPIED)):
         values[tuple((blocks.cells - low_cell).T[::-1])] = value
@@ -52,13 +50,13 @@ def elevation(blocks: Blocks) -> Raster:
 
     Raises ExportError for a raster that is too large.
     """
-    low_cell, shape = _box_around(blocks.cells)
+    low_cell, shape = box_around(blocks.cells)
     values = np.full(shape, -np.inf)
     np.maximum.at(values, tuple((blocks.cells - low_cell).T[::-1]), blocks.height)
     return Raster(np.where(np.isinf(values), np.nan, values), low_cell * blocks.resolution, blocks.resolution)
 
 
-def _box_around(cells: np.ndarray) -> Tuple[np.ndarray, Tuple[int, int]]:
+def box_around(cells: np.ndarray) -> Tuple[np.ndarray, Tuple[int, int]]:
     """Return the first cell (2,) int64 of the box around cells (n, 2), and its rows and columns."""
     if not len(cells):
         return np.zeros(2, dtype=np.int64), (0, 0)
