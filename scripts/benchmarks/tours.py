@@ -12,7 +12,7 @@ from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
 from sonar_processing.beams.beam import Beam
 from sonar_simulator.simulation.robot import RobotDescription
-from sonar_simulator.simulation.simulation import Settings, make_setup
+from sonar_simulator.simulation.simulation import Settings, Simulation
 
 HEAD = SonarKind(500, 0.15, 0.3)  # the demo's
 _START = 1000.0  # s
@@ -55,15 +55,15 @@ def simulated(name: str, kind: SonarKind = HEAD, seed: int = 1) -> Tour:
         world=f"worlds/{name.split('_')[0]}.sdf", script=f"yaml/{name}.yaml", odometry={"scale_error": 0.0}, seed=seed,
     )  # fmt: skip
     robot = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
-    setup = make_setup(Settings.from_mapping(values), ROOT, robot, lambda warning: None)
+    simulation = Simulation(Settings.from_mapping(values), ROOT, robot, lambda warning: None)
     times, poses, beams = [], [], []
-    for moment in setup.simulation.moments(20.0, 120):
+    for moment in simulation.moments(20.0, 120):
         time, pose = _START + moment.time, moment.truth.T_world_base
         if not times or time > times[-1]:
             times.append(time)
             poses.append([pose[0, 3], pose[1, 3], np.arctan2(pose[1, 0], pose[0, 0])])
         if moment.ping is not None:
-            ping = moment.ping
-            beams.append(Beam(round(1e9 * time), "sonar", ping.angle, ping.strengths, setup.sonar.range_resolution))
+            ping, resolution = moment.ping, simulation.sonar.range_resolution
+            beams.append(Beam(round(1e9 * time), "sonar", ping.angle, ping.strengths, resolution))
     path, steps = Track(np.array(times), np.array(poses)), np.arange(times[0], times[-1], _STEP)
-    return Tour(Track(steps, path.at(steps)), beams, setup.T_base_sonar)
+    return Tour(Track(steps, path.at(steps)), beams, simulation.T_base_sonar)

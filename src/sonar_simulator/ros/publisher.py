@@ -1,6 +1,6 @@
 """What the simulator publishes: moments, the clock, the world, and where its sonar truly is."""
 
-from typing import Dict
+from typing import Dict, List, Tuple
 
 import numpy as np
 import rosgraph
@@ -17,8 +17,8 @@ from visualization_msgs.msg import Marker
 
 from node_support import topics
 from recordings.bags.messages import Placing
-from sonar_simulator.simulation.moment_messages import MAP_FRAME, TOPICS, MomentMessages
-from sonar_simulator.simulation.simulation import Drive, Instruments, Moment
+from sonar_simulator.simulation.moment_messages import MAP_FRAME, TOPICS, MomentMessages, map_origin
+from sonar_simulator.simulation.simulation import Drive, Head, Moment, Simulation, SimulatorParameters
 from sonar_simulator.world.world import World, world_triangles
 from underwater_map_construction.msg import SonarScanLine
 
@@ -56,25 +56,6 @@ def world_marker(world: World, frame_id: str, origin: np.ndarray) -> Marker:
 
 WORLD_FRAME = "world"
 TRUE_SONAR_FRAME = "true_sonar"
-
-
-class TrueSonar:
-    """Publishes world -> true_sonar, and world -> map as where the vehicle's map begins, so that both have one root."""
-
-    def __init__(self, origin: np.ndarray) -> None:
-        """origin: (3,) m, of the map in the world."""
-        self._broadcaster = tf2_ros.TransformBroadcaster()
-        self._T_world_map = np.eye(4)
-        self._T_world_map[:3, 3] = origin
-
-    def publish(self, T_world_sonar: np.ndarray, stamp: rospy.Time) -> None:
-        """Publish where the sonar is, (4, 4)."""
-        poses = {TRUE_SONAR_FRAME: T_world_sonar, MAP_FRAME: self._T_world_map}
-        self._broadcaster.sendTransform(
-            [MESSAGES.transform(Placing.of(pose), stamp, WORLD_FRAME, frame) for frame, pose in poses.items()]
-        )
-
-
 _QUEUE_SIZE = 1000  # A second of every topic at the usual rates and ten times the real time
 
 
@@ -82,21 +63,25 @@ class SimulatorPublisher:
     """The simulator's topics. Its world is in the frame `map`, from which `odom` drifts away by the odometry's error.
 
     If the vehicle follows a script, nobody sends commands; the velocity is then also published on cmd_vel, where other
-    nodes expect it.
+    nodes expect it. For an emulated head there is world -> true_sonar, and world -> map as where the vehicle's map
+    begins, so that both have one root.
     """
 
-    def __init__(self, max_range: float, drive: Drive, instruments: Instruments, origin: np.ndarray) -> None:
-        """`max_range`: of the sonar, m. origin: (3,) m, where the map begins in the world."""
-        self._origin = origin
-        self._max_range = max_range
-        self._instruments = instruments
+    def __init__(self, simulation: Simulation, parameters: SimulatorParameters) -> None:
+        self._simulation = simulation
+        self._instruments = parameters.instruments
+        self._origin = map_origin(simulation.T_world_start, self._instruments)
+        self._T_world_map = np.eye(4)
+        self._T_world_map[:3, 3] = self._origin
         self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
         self._progress = rospy.Publisher("~progress", Float32, queue_size=1, latch=True)
         self._world = rospy.Publisher("~world", Marker, queue_size=1, latch=True)
-        self._publishers = {topic: _publisher(topic, kind) for topic, kind in TOPICS[instruments].items()}
-        velocity = TOPICS[instruments].get(topics.VELOCITY)
-        is_told = drive is Drive.SCRIPT and velocity is not None
-        self._commands = _publisher(topics.VELOCITY_COMMANDS, velocity) if is_told else None
+        self._world.publish(world_marker(simulation.world, MAP_FRAME, self._origin))
+        kinds = TOPICS[self._instruments]
+        self._publishers = {topic: _publisher(topic, kind) for topic, kind in kinds.items()}
+        is_told = parameters.drive is Drive.SCRIPT and topics.VELOCITY in kinds
+        self._commands = _publisher(topics.VELOCITY_COMMANDS, kinds[topics.VELOCITY]) if is_told else None
+        self._broadcaster = tf2_ros.TransformBroadcaster() if parameters.head is Head.EMULATED else None
 
     @property
     def has_listener(self) -> bool:
@@ -114,26 +99,27 @@ class SimulatorPublisher:
             one.get_num_connections() < subscribers.get(one.resolved_name, 0) for one in made
         )
 
-    def publish_clock(self, stamp: rospy.Time) -> None:
-        self._clock.publish(Clock(clock=stamp))
-
-    def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
-        """Publish what places a waiting sonar: the time, and the vehicle and its servo at a moment."""
-        self.publish_clock(stamp)
-        for topic, message in MESSAGES.placing(moment, stamp, self._instruments):
-            self._publishers[topic].publish(message)
-
-    def publish_world(self, world: World) -> None:
-        """Publish the world once; latched."""
-        self._world.publish(world_marker(world, MAP_FRAME, self._origin))
-
     def publish_progress(self, share: float) -> None:
         """Publish the completed share of the script; 1 at its end."""
         self._progress.publish(Float32(data=share))
 
+    def publish_rest(self, moment: Moment, stamp: rospy.Time) -> None:
+        """Publish what places a waiting sonar: the time, and the vehicle and its servo at a moment."""
+        self._publish(moment, stamp, MESSAGES.placing(moment, stamp, self._instruments))
+
     def publish(self, moment: Moment, stamp: rospy.Time) -> None:
-        self.publish_clock(stamp)
-        for topic, message in MESSAGES.at(moment, stamp, self._max_range, self._instruments, self._origin):
+        max_range = self._simulation.sonar.max_range
+        self._publish(moment, stamp, MESSAGES.at(moment, stamp, max_range, self._instruments, self._origin))
+
+    def _publish(self, moment: Moment, stamp: rospy.Time, messages: List[Tuple[str, Message]]) -> None:
+        # Before the clock, so that a beam that is stamped with it is heard from where the sonar was then.
+        if self._broadcaster is not None:
+            poses = {TRUE_SONAR_FRAME: self._simulation.sonar_pose(moment), MAP_FRAME: self._T_world_map}
+            self._broadcaster.sendTransform(
+                [MESSAGES.transform(Placing.of(pose), stamp, WORLD_FRAME, frame) for frame, pose in poses.items()]
+            )
+        self._clock.publish(Clock(clock=stamp))
+        for topic, message in messages:
             self._publishers[topic].publish(message)
             if topic == topics.VELOCITY and self._commands is not None:
                 self._commands.publish(message)

@@ -17,10 +17,9 @@ from node_support.parameters import ParameterError
 from node_support.ros.callbacks import guarded, make_health
 from node_support.ros.node import run
 from node_support.timing import Pace, UsualInterval
-from sonar_simulator.ros.publisher import SimulatorPublisher, TrueSonar
-from sonar_simulator.simulation.moment_messages import map_origin
+from sonar_simulator.ros.publisher import SimulatorPublisher
 from sonar_simulator.simulation.robot import RobotDescription
-from sonar_simulator.simulation.simulation import Drive, Head, Moment, Settings, make_setup
+from sonar_simulator.simulation.simulation import Drive, Moment, Settings, Simulation
 from underwater_map_construction.msg import StampedIntensityCloud
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
@@ -67,14 +66,9 @@ class Simulator:
         self.health = make_health("sonar_simulator")
         self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
-        folder = package_folder()
         self._parameters = settings.simulator
-        self._setup = make_setup(settings, folder, _robot(), lambda line: rospy.logwarn("%s", line))
-        instruments = self._parameters.instruments
-        origin = map_origin(self._setup.T_world_start, instruments)
-        self._publisher = SimulatorPublisher(self._setup.sonar.max_range, self._parameters.drive, instruments, origin)
-        self._publisher.publish_world(self._setup.world)
-        self._true_sonar = TrueSonar(origin) if self._parameters.head is Head.EMULATED else None
+        self._simulation = Simulation(settings, package_folder(), _robot(), lambda line: rospy.logwarn("%s", line))
+        self._publisher = SimulatorPublisher(self._simulation, settings.simulator)
         self._echoes = Echoes()
         self._start_time = START_TIME
         self._now = 0.0
@@ -95,20 +89,20 @@ class Simulator:
 
     def _take_servo_command(self, command: Float64) -> None:
         with self._lock:
-            self._setup.servo.command(command.data)
+            self._simulation.servo.command(command.data)
 
     def _take_velocity_command(self, command: Twist) -> None:
         linear, angular = command.linear, command.angular
         twist = np.array([linear.x, linear.y, linear.z, angular.x, angular.y, angular.z])
         self.health.count("velocity commands")
         with self._lock:
-            limited = self._setup.commanded.command(self._now, twist)
+            limited = self._simulation.commanded.command(self._now, twist)
         self.health.count("velocity commands limited", int(limited))
 
     def _run(self) -> None:
         if self._parameters.wait_for_listener and self._parameters.drive is Drive.SCRIPT:
             self._wait_for_listener()
-        simulation, rate = self._setup.simulation, self._parameters.clock_rate
+        simulation, rate = self._simulation, self._parameters.clock_rate
         pace = Pace(self._parameters.real_time_factor, self._ended.wait)
         moments = simulation.moments(rate, self._beams_at_once())
         while self._play(moments, pace):
@@ -136,8 +130,6 @@ class Simulator:
         self._keep_pace(moment, pace)
         if self._ended.is_set():
             return False
-        # Before the clock, so that a beam that is stamped with it is heard from where the sonar was then.
-        self._publish_true_sonar(moment, self._stamp(moment.time))
         self._publisher.publish(moment, self._stamp(moment.time))
         self._now = moment.time
         self.health.count("moments")
@@ -153,18 +145,13 @@ class Simulator:
 
     def _wait_for_listener(self) -> None:
         """Let the clock run until somebody subscribes to the beams, and all who subscribe have been connected."""
-        start, waited = self._setup.simulation.moment(0.0), 0.0
+        start, waited = self._simulation.moment(0.0), 0.0
         while waited < _LONGEST_START and not self._ended.wait(_WAIT_STEP):
             waited += _WAIT_STEP if self._publisher.has_listener else 0.0
-            self._publish_true_sonar(start, rospy.Time.from_sec(self._start_time))
             self._publisher.publish_rest(start, rospy.Time.from_sec(self._start_time))
             self._start_time += _WAIT_STEP
             if waited >= _LISTENER_TIME and not self._publisher.lacks_listeners():
                 return
-
-    def _publish_true_sonar(self, moment: Moment, stamp: rospy.Time) -> None:
-        if self._true_sonar is not None:
-            self._true_sonar.publish(self._setup.simulation.sonar_pose(moment), stamp)
 
     def _stamp(self, seconds: float) -> rospy.Time:
         return rospy.Time.from_sec(self._start_time + seconds)

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, List, Mapping, NamedTuple, Protocol, Sequence, Tuple, Type, Union
+from typing import Any, List, Mapping, NamedTuple, Sequence, Tuple, Type, Union
 
 import numpy as np
 
@@ -21,16 +21,6 @@ class VehicleState:
     T_world_base: np.ndarray
     twist: np.ndarray
     is_still: bool
-
-
-class Movement(Protocol):
-    """A vehicle in motion."""
-
-    duration: float
-    """When the motion ends, s since its start; inf if it has no end."""
-
-    def state(self, time: float) -> VehicleState:
-        """Return the state at `time` s since the start; times must not decrease from call to call."""
 
 
 # Peak speed over mean speed of the minimum-jerk law: its greatest slope, reached half way.

@@ -19,7 +19,7 @@ from recordings.bags.messages import Placing
 from recordings.bags.writers import COMPRESSIONS, BagWriter
 from sonar_simulator.simulation.moment_messages import MomentMessages, map_origin
 from sonar_simulator.simulation.robot import RobotDescription, tilted
-from sonar_simulator.simulation.simulation import BASE_FRAME, SONAR_FRAME, Drive, Moment, Settings, Setup, make_setup
+from sonar_simulator.simulation.simulation import BASE_FRAME, SONAR_FRAME, Drive, Moment, Settings, Simulation
 
 START_TIME = 1000.0  # s: stamps before it, as of late transforms, are still above 0
 BEAMS_AT_ONCE = 120  # Beams cast together: one revolution of the usual head
@@ -30,12 +30,12 @@ _SETTINGS_TOPIC = "/sonar_simulator/settings"
 class SimulatedBag:
     """Writes moments into a bag, at the times and on the topics that the simulator node would use."""
 
-    def __init__(self, bag: BagWriter, setup: Setup, settings: Settings) -> None:
+    def __init__(self, bag: BagWriter, simulation: Simulation, settings: Settings) -> None:
         self._bag = bag
-        self._setup = setup
+        self._simulation = simulation
         self._settings = settings
         self._messages = MomentMessages(bag.make, np.asarray)
-        self._origin = map_origin(setup.T_world_start, settings.simulator.instruments)
+        self._origin = map_origin(simulation.T_world_start, settings.simulator.instruments)
 
     def begin(self, robot: RobotDescription) -> None:
         """Write what applies to the whole bag: the fixed transforms and the parameters."""
@@ -54,10 +54,10 @@ class SimulatedBag:
         """Write everything that belongs to a moment; its transforms are one message."""
         stamp_ns = _stamp_ns(moment.time)
         stamp, instruments = self._bag.time(stamp_ns), self._settings.simulator.instruments
-        messages = self._messages.at(moment, stamp, self._setup.sonar.max_range, instruments, self._origin)
+        messages = self._messages.at(moment, stamp, self._simulation.sonar.max_range, instruments, self._origin)
         if messages[0][0] != topics.TRANSFORMS:
             messages.insert(0, (topics.TRANSFORMS, self._messages.transforms([])))
-        mount = Placing.of(tilted(self._setup.T_base_sonar, moment.tilt))
+        mount = Placing.of(tilted(self._simulation.T_base_sonar, moment.tilt))
         messages[0][1].transforms.append(self._messages.transform(mount, stamp, BASE_FRAME, SONAR_FRAME))
         for topic, message in messages:
             self._write(topic, message, stamp_ns)
@@ -77,7 +77,7 @@ def _name(topic: str) -> str:
 
 
 def write_bag(
-    path: Path, setup: Setup, settings: Settings, robot: RobotDescription, compression: str = "none",
+    path: Path, simulation: Simulation, settings: Settings, robot: RobotDescription, compression: str = "none",
     tell: Callable[[float], object] = lambda time: None,
 ) -> int:  # fmt: skip
     """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
@@ -86,9 +86,9 @@ def write_bag(
     """
     beams = 0
     with whole_file(path) as temporary, BagWriter(temporary, compression) as bag:
-        writer = SimulatedBag(bag, setup, settings)
+        writer = SimulatedBag(bag, simulation, settings)
         writer.begin(robot)
-        for moment in setup.simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
+        for moment in simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
             writer.add(moment)
             beams += moment.ping is not None
             tell(moment.time)
@@ -186,12 +186,12 @@ def _run(options: Namespace) -> None:
     if settings.simulator.drive is not Drive.SCRIPT:
         raise ParameterError("drive = 'CMD_VEL': nobody sends commands while a bag is written; must be SCRIPT")
     robot = RobotDescription.from_file(options.robot or package / "urdf/charle.urdf")
-    setup = make_setup(settings, package, robot, lambda line: print(f"simulate_bag: {line}", file=sys.stderr))
+    simulation = Simulation(settings, package, robot, lambda line: print(f"simulate_bag: {line}", file=sys.stderr))
     start = time.monotonic()
-    duration = setup.simulation.duration
+    duration = simulation.duration
     with tqdm(total=round(duration), unit="s", disable=options.quiet or None, desc=options.out.name) as bar:
         beams = write_bag(
-            options.out.absolute(), setup, settings, robot, options.compression,
+            options.out.absolute(), simulation, settings, robot, options.compression,
             lambda now: bar.update(round(now) - bar.n),
         )  # fmt: skip
         bar.update(bar.total - bar.n)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 from pathlib import Path
-from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Type, Union
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Type, Union
 
 import numpy as np
 
@@ -13,9 +13,8 @@ from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.commanded_vehicle import CommandedVehicle, VehicleParameters
 from sonar_simulator.simulation.odometry import Estimate, NoOdometry, Odometry, OdometryParameters
 from sonar_simulator.simulation.robot import RobotDescription, Servo, ServoParameters, tilted
-from sonar_simulator.simulation.scripted_vehicle import Movement, TiltCommand, VehicleState, load_script
+from sonar_simulator.simulation.scripted_vehicle import VehicleScript, VehicleState, load_script
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
-from sonar_simulator.world.world import World
 from sonar_simulator.world.world_file import load_world
 
 
@@ -100,82 +99,6 @@ class Moment:
     ping: Optional[Ping] = None
 
 
-class Simulation:
-    """Runs once, forwards. Ticks come at a steady rate, pings when the head sends them."""
-
-    def __init__(
-        self, movement: Movement, odometry: Union[Odometry, NoOdometry], sonar: Sonar, head: Optional[SonarHead],
-        T_base_sonar: np.ndarray, servo: Servo, tilt_commands: Sequence[TiltCommand],
-    ) -> None:  # fmt: skip
-        """`T_base_sonar` (4, 4) is the sonar's mount with its servo at 0. Without `head` there are no pings."""
-        self.duration = movement.duration
-        self._movement = movement
-        self._odometry = odometry
-        self._sonar = sonar
-        self._head = head
-        self._T_base_sonar = T_base_sonar
-        self._servo = servo
-        self._tilt_commands = list(tilt_commands)
-
-    def moments(self, tick_rate: float, beams_at_once: int = 1) -> Iterator[Moment]:
-        """Yield all moments from time 0 to the end of the motion, in order of time.
-
-        With `beams_at_once` > 1, moments are held back until that many beams can be cast together. This is faster, and
-        draws random numbers in a different order.
-        """
-        waiting: List[Moment] = []
-        beams = 0
-        for moment in self._unheard(tick_rate):
-            waiting.append(moment)
-            beams += int(moment.head_angle is not None)
-            if beams in (0, beams_at_once):
-                yield from self._heard(waiting)
-                waiting, beams = [], 0
-        yield from self._heard(waiting)
-
-    def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
-        """Return the state at `time`, not before that of the last call, with a beam still to be simulated."""
-        self._command_tilt(time)
-        truth = self._movement.state(time)
-        return Moment(time, truth, self._odometry.estimate(time, truth), self._servo.angle(time), is_tick, head_angle)
-
-    def sonar_pose(self, moment: Moment) -> np.ndarray:
-        """Return the (4, 4) T_world_sonar that the sonar truly has at a moment."""
-        return moment.truth.T_world_base @ tilted(self._T_base_sonar, moment.tilt)
-
-    def _unheard(self, tick_rate: float) -> Iterator[Moment]:
-        tick, beam = 0, 0
-        while True:
-            tick_time, beam_time = tick / tick_rate, np.inf if self._head is None else self._head.time(beam)
-            if min(tick_time, beam_time) > self.duration:
-                return
-            if beam_time <= tick_time:
-                both = beam_time == tick_time
-                yield self.moment(beam_time, both, self._head.angle(beam))
-                beam += 1
-                tick += int(both)
-            else:
-                yield self.moment(tick_time)
-                tick += 1
-
-    def _heard(self, moments: List[Moment]) -> List[Moment]:
-        sending = [moment for moment in moments if moment.head_angle is not None]
-        if not sending:
-            return moments
-        poses = np.array([self.sonar_pose(moment) for moment in sending])
-        beams = iter(self._sonar.pings(poses, np.array([moment.head_angle for moment in sending])))
-        return [
-            moment if moment.head_angle is None else replace(moment, ping=Ping(moment.head_angle, next(beams)))
-            for moment in moments
-        ]
-
-    def _command_tilt(self, time: float) -> None:
-        while self._tilt_commands and self._tilt_commands[0].time <= time:
-            command = self._tilt_commands.pop(0)
-            self._servo.angle(command.time)
-            self._servo.command(command.angle)
-
-
 BASE_FRAME = "base_link"
 SONAR_FRAME = "sonar"
 
@@ -217,51 +140,96 @@ class Settings:
         return {**self.simulator.to_mapping(), **{name: group.to_mapping() for name, group in groups.items()}}
 
 
-@dataclass(frozen=True)
-class Setup:
-    """A simulation, and those of its parts that others use. T_world_start: (4, 4), of the vehicle."""
+class Simulation:
+    """Runs once, forwards. Ticks come at a steady rate, pings when the head sends them.
 
-    simulation: Simulation
-    world: World
-    sonar: Sonar
-    servo: Servo
-    commanded: CommandedVehicle
-    T_base_sonar: np.ndarray
-    T_world_start: np.ndarray
-
-
-def make_setup(settings: Settings, folder: Path, robot: RobotDescription, warn: Callable[[str], None]) -> Setup:
-    """Load world and script, relative to `folder`, and put everything together.
-
-    `warn` receives a line for each part of the world that could not be loaded. Raises ParameterError.
+    `T_base_sonar` (4, 4) is the sonar's mount with its servo at 0, `T_world_start` (4, 4) where the vehicle starts.
     """
-    parameters = settings.simulator
-    model = make_echo_model(parameters.echo_model.value, settings.echo.to_mapping())
-    script = load_script(folder / Path(parameters.script).expanduser())
-    T_base_sonar = robot.mount(BASE_FRAME, SONAR_FRAME)
-    loaded = load_world(folder / Path(parameters.world).expanduser())
-    for warning in loaded.warnings:
-        warn(warning)
-    # Separate streams, so that a change of the odometry's noise does not change the beams.
-    beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
-    sonar = Sonar(RayCaster(loaded.world), settings.sonar.pattern(), model, beams)
-    servo = Servo(settings.servo)
-    commanded = CommandedVehicle(settings.vehicle, script.start)
-    is_scripted = parameters.drive is Drive.SCRIPT
-    simulation = Simulation(
-        script if is_scripted else commanded, _odometry(settings, script.pose(0.0), measurements), sonar,
-        _head(settings), T_base_sonar, servo, script.tilt_commands if is_scripted else (),
-    )  # fmt: skip
-    return Setup(simulation, loaded.world, sonar, servo, commanded, T_base_sonar, script.pose(0.0))
 
+    def __init__(self, settings: Settings, folder: Path, robot: RobotDescription, warn: Callable[[str], None]) -> None:
+        """Load world and script, relative to `folder`, and put everything together.
 
-def _head(settings: Settings) -> Optional[SonarHead]:
-    if settings.simulator.head is Head.EMULATED:
-        return None
-    return SonarHead(settings.sonar.beams_per_turn, settings.sonar.seconds_per_turn)
+        `warn` receives a line for each part of the world that could not be loaded. Raises ParameterError.
+        """
+        parameters = settings.simulator
+        model = make_echo_model(parameters.echo_model.value, settings.echo.to_mapping())
+        script = load_script(folder / Path(parameters.script).expanduser())
+        self.T_base_sonar = robot.mount(BASE_FRAME, SONAR_FRAME)
+        loaded = load_world(folder / Path(parameters.world).expanduser())
+        for warning in loaded.warnings:
+            warn(warning)
+        # Separate streams, so that a change of the odometry's noise does not change the beams.
+        beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
+        self.world = loaded.world
+        self.sonar = Sonar(RayCaster(loaded.world), settings.sonar.pattern(), model, beams)
+        self.servo = Servo(settings.servo)
+        self.commanded = CommandedVehicle(settings.vehicle, script.start)
+        self.T_world_start = script.pose(0.0)
+        is_scripted = parameters.drive is Drive.SCRIPT
+        self._movement: Union[VehicleScript, CommandedVehicle] = script if is_scripted else self.commanded
+        self._tilt_commands = list(script.tilt_commands) if is_scripted else []
+        self.duration = self._movement.duration
+        self._odometry: Union[Odometry, NoOdometry] = NoOdometry(self.T_world_start)
+        if parameters.instruments is not Instruments.NONE:
+            self._odometry = Odometry(settings.odometry, self.T_world_start, measurements)
+        self._head: Optional[SonarHead] = None
+        if parameters.head is Head.SIMULATED:
+            self._head = SonarHead(settings.sonar.beams_per_turn, settings.sonar.seconds_per_turn)
 
+    def moments(self, tick_rate: float, beams_at_once: int = 1) -> Iterator[Moment]:
+        """Yield all moments from time 0 to the end of the motion, in order of time.
 
-def _odometry(settings: Settings, start: np.ndarray, rng: np.random.Generator) -> Union[Odometry, NoOdometry]:
-    if settings.simulator.instruments is Instruments.NONE:
-        return NoOdometry(start)
-    return Odometry(settings.odometry, start, rng)
+        With `beams_at_once` > 1, moments are held back until that many beams can be cast together. This is faster, and
+        draws random numbers in a different order.
+        """
+        waiting: List[Moment] = []
+        beams = 0
+        for moment in self._unheard(tick_rate):
+            waiting.append(moment)
+            beams += int(moment.head_angle is not None)
+            if beams in (0, beams_at_once):
+                yield from self._heard(waiting)
+                waiting, beams = [], 0
+        yield from self._heard(waiting)
+
+    def moment(self, time: float, is_tick: bool = True, head_angle: Optional[float] = None) -> Moment:
+        """Return the state at `time`, not before that of the last call, with a beam still to be simulated."""
+        self._command_tilt(time)
+        truth = self._movement.state(time)
+        return Moment(time, truth, self._odometry.estimate(time, truth), self.servo.angle(time), is_tick, head_angle)
+
+    def sonar_pose(self, moment: Moment) -> np.ndarray:
+        """Return the (4, 4) T_world_sonar that the sonar truly has at a moment."""
+        return moment.truth.T_world_base @ tilted(self.T_base_sonar, moment.tilt)
+
+    def _unheard(self, tick_rate: float) -> Iterator[Moment]:
+        tick, beam = 0, 0
+        while True:
+            tick_time, beam_time = tick / tick_rate, np.inf if self._head is None else self._head.time(beam)
+            if min(tick_time, beam_time) > self.duration:
+                return
+            if beam_time <= tick_time:
+                both = beam_time == tick_time
+                yield self.moment(beam_time, both, self._head.angle(beam))
+                beam += 1
+                tick += int(both)
+            else:
+                yield self.moment(tick_time)
+                tick += 1
+
+    def _heard(self, moments: List[Moment]) -> List[Moment]:
+        sending = [moment for moment in moments if moment.head_angle is not None]
+        if not sending:
+            return moments
+        poses = np.array([self.sonar_pose(moment) for moment in sending])
+        beams = iter(self.sonar.pings(poses, np.array([moment.head_angle for moment in sending])))
+        return [
+            moment if moment.head_angle is None else replace(moment, ping=Ping(moment.head_angle, next(beams)))
+            for moment in moments
+        ]
+
+    def _command_tilt(self, time: float) -> None:
+        while self._tilt_commands and self._tilt_commands[0].time <= time:
+            command = self._tilt_commands.pop(0)
+            self.servo.angle(command.time)
+            self.servo.command(command.angle)

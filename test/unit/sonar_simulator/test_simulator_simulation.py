@@ -7,7 +7,7 @@ from programs import ROOT
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_simulator.simulation.robot import RobotDescription
-from sonar_simulator.simulation.simulation import Settings, make_setup
+from sonar_simulator.simulation.simulation import Settings, Simulation
 
 CHARLE = RobotDescription.from_file(ROOT / "urdf/charle.urdf")
 QUICK = {"sonar": {"ray_rows": 5, "ray_columns": 3}}
@@ -29,13 +29,13 @@ def script(tmp_path):
     return str(path)
 
 
-def _setup(script, **values):
+def _simulation(script, **values):
     settings = Settings.from_mapping({"world": "worlds/tank.sdf", "script": script, **QUICK, **values})
-    return make_setup(settings, ROOT, CHARLE, pytest.fail)
+    return Simulation(settings, ROOT, CHARLE, pytest.fail)
 
 
 def _moments(script, beams_at_once=1, **values):
-    return list(_setup(script, **values).simulation.moments(20.0, beams_at_once))
+    return list(_simulation(script, **values).moments(20.0, beams_at_once))
 
 
 def test_ticks_and_beams_come_in_order_each_at_its_own_rate(script):
@@ -77,11 +77,11 @@ def test_the_noise_of_the_odometry_leaves_the_beams_alone(script):
 
 
 def test_a_commanded_vehicle_begins_at_the_scripts_start_and_never_ends(script):
-    setup = _setup(script, drive="CMD_VEL")
-    assert setup.simulation.duration == math.inf
-    np.testing.assert_array_equal(setup.simulation.moment(5.0).truth.T_world_base, pose_matrix((-2.0, 0.0, -1.2)))
-    setup.commanded.command(5.0, np.array([0.5, 0, 0, 0, 0, 0]))
-    assert setup.simulation.moment(6.0).truth.T_world_base[0, 3] > -2.0
+    simulation = _simulation(script, drive="CMD_VEL")
+    assert simulation.duration == math.inf
+    np.testing.assert_array_equal(simulation.moment(5.0).truth.T_world_base, pose_matrix((-2.0, 0.0, -1.2)))
+    simulation.commanded.command(5.0, np.array([0.5, 0, 0, 0, 0, 0]))
+    assert simulation.moment(6.0).truth.T_world_base[0, 3] > -2.0
 
 
 @pytest.mark.parametrize(
@@ -110,4 +110,4 @@ def test_bad_settings_are_refused_with_group_key_and_what_is_allowed(values, tex
 )
 def test_files_and_robots_that_cannot_be_used_are_named(script, values, robot, text):
     with pytest.raises(ParameterError, match=text):
-        make_setup(Settings.from_mapping({"script": script, **values}), ROOT, robot, pytest.fail)
+        Simulation(Settings.from_mapping({"script": script, **values}), ROOT, robot, pytest.fail)
