@@ -130,7 +130,7 @@ class Simulator:
         self._keep_pace(moment, pace)
         if self._ended.is_set():
             return False
-        self._publisher.publish(moment, self._stamp(moment.time))
+        self._publisher.publish(moment, rospy.Time.from_sec(self._start_time + moment.time))
         self._now = moment.time
         self.health.count("moments")
         self.health.count("beams out", int(moment.ping is not None))
@@ -152,9 +152,6 @@ class Simulator:
             self._start_time += _WAIT_STEP
             if waited >= _LISTENER_TIME and not self._publisher.lacks_listeners():
                 return
-
-    def _stamp(self, seconds: float) -> rospy.Time:
-        return rospy.Time.from_sec(self._start_time + seconds)
 
 
 def _robot() -> RobotDescription:

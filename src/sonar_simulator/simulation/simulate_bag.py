@@ -3,9 +3,8 @@
 import argparse
 import sys
 import time
-from argparse import Namespace
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional, Sequence
+from typing import Any, Dict, Optional, Sequence
 
 import numpy as np
 import yaml
@@ -46,8 +45,10 @@ class SimulatedBag:
             for joint in robot.fixed_joints
         ]
         self._write(topics.STATIC_TRANSFORMS, self._messages.transforms(transforms), stamp_ns)
-        told = self._bag.make("std_msgs/String")
-        told.data = _told(self._settings)
+        values, told = self._settings.to_mapping(), self._bag.make("std_msgs/String")
+        # File names only, so that the bag does not depend on the folder.
+        files = {key: Path(values[key]).name for key in ("world", "script")}
+        told.data = yaml.safe_dump({**values, **files}, sort_keys=False)
         self._write(_SETTINGS_TOPIC, told, stamp_ns)
 
     def add(self, moment: Moment) -> None:
@@ -63,43 +64,12 @@ class SimulatedBag:
             self._write(topic, message, stamp_ns)
 
     def _write(self, topic: str, message: Any, stamp_ns: int) -> None:
-        self._bag.write(_name(topic), message, stamp_ns)
+        topic = _RENAMED.get(topic, topic)
+        self._bag.write(topic if topic.startswith("/") else f"/{topic}", message, stamp_ns)
 
 
 def _stamp_ns(seconds: float) -> int:
     return round(float(START_TIME + seconds) * 1e9)
-
-
-def _name(topic: str) -> str:
-    """Return a topic of the simulator as the bag has it."""
-    topic = _RENAMED.get(topic, topic)
-    return topic if topic.startswith("/") else f"/{topic}"
-
-
-def write_bag(
-    path: Path, simulation: Simulation, settings: Settings, robot: RobotDescription, compression: str = "none",
-    tell: Callable[[float], object] = lambda time: None,
-) -> int:  # fmt: skip
-    """Write the bag of a simulation that ends, completely or not at all; return the number of its beams.
-
-    `tell` receives the simulated time [s] of each moment. Raises OSError.
-    """
-    beams = 0
-    with whole_file(path) as temporary, BagWriter(temporary, compression) as bag:
-        writer = SimulatedBag(bag, simulation, settings)
-        writer.begin(robot)
-        for moment in simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
-            writer.add(moment)
-            beams += moment.ping is not None
-            tell(moment.time)
-    return beams
-
-
-def _told(settings: Settings) -> str:
-    """Return the settings as yaml, with file names only, so that the bag does not depend on the folder."""
-    values = settings.to_mapping()
-    files = {key: Path(values[key]).name for key in ("world", "script")}
-    return yaml.safe_dump({**values, **files}, sort_keys=False)
 
 
 _EPILOG = """\
@@ -179,7 +149,7 @@ def run_simulate_bag(arguments: Optional[Sequence[str]] = None) -> None:
         _run(parse(arguments))
 
 
-def _run(options: Namespace) -> None:
+def _run(options: argparse.Namespace) -> None:
     check_output(options.out, [], options.overwrite, ".bag")
     package = package_folder()
     settings = Settings.from_mapping(settings_of(options, package))
@@ -187,13 +157,15 @@ def _run(options: Namespace) -> None:
         raise ParameterError("drive = 'CMD_VEL': nobody sends commands while a bag is written; must be SCRIPT")
     robot = RobotDescription.from_file(options.robot or package / "urdf/charle.urdf")
     simulation = Simulation(settings, package, robot, lambda line: print(f"simulate_bag: {line}", file=sys.stderr))
-    start = time.monotonic()
-    duration = simulation.duration
+    start, duration, beams = time.monotonic(), simulation.duration, 0
     with tqdm(total=round(duration), unit="s", disable=options.quiet or None, desc=options.out.name) as bar:
-        beams = write_bag(
-            options.out.absolute(), simulation, settings, robot, options.compression,
-            lambda now: bar.update(round(now) - bar.n),
-        )  # fmt: skip
+        with whole_file(options.out.absolute()) as temporary, BagWriter(temporary, options.compression) as bag:
+            writer = SimulatedBag(bag, simulation, settings)
+            writer.begin(robot)
+            for moment in simulation.moments(settings.simulator.clock_rate, BEAMS_AT_ONCE):
+                writer.add(moment)
+                beams += moment.ping is not None
+                bar.update(round(moment.time) - bar.n)
         bar.update(bar.total - bar.n)
     seconds = time.monotonic() - start
     if not options.quiet:
