@@ -8,16 +8,12 @@ from node_support.parameters import parameter
 
 
 class PoseMessage(Enum):
-    """The MAVLink message that carries the position."""
-
     ODOMETRY = "ODOMETRY"
     VISION_POSITION_ESTIMATE = "VISION_POSITION_ESTIMATE"
 
 
 @dataclass(frozen=True)
 class AutopilotLinkParameters(StampParameters):
-    """How the position gets to the autopilot."""
-
     connection: str = parameter(
         "udpin:0.0.0.0:14550",
         "where the autopilot is: udpin:HOST:PORT (it sends to us), udpout:HOST:PORT (we send to it), a serial device "

@@ -15,24 +15,18 @@ from node_support.timing import UsualInterval
 
 
 class VelocitySource(Enum):
-    """Where the vehicle's velocity comes from."""
-
     ESTIMATE = "ESTIMATE"
     COMMANDS = "COMMANDS"
     MEASURED = "MEASURED"
 
 
 class HeadingType(Enum):
-    """What the compass publishes."""
-
     IMU = "IMU"
     COMPASS_DEGREES = "COMPASS_DEGREES"
     COMPASS_RADIANS = "COMPASS_RADIANS"
 
 
 class DepthType(Enum):
-    """What the depth sensor publishes."""
-
     NONE = "NONE"
     POSE = "POSE"
     DEPTH = "DEPTH"

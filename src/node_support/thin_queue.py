@@ -10,8 +10,6 @@ _BURST = 1.0  # s of the link that may be sent at once after a pause
 
 @dataclass(frozen=True)
 class ThinLinkParameters(ParameterSet):
-    """Parameters of thin_link."""
-
     bytes_per_second: float = parameter(
         24000.0, "bytes that are sent in a second; leave a quarter of the link to ROS itself", low=100.0, high=1e9
     )

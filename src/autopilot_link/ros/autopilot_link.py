@@ -39,7 +39,6 @@ class MavrosTopics:
     name = "MAVROS"
 
     def __init__(self, parameters: AutopilotLinkParameters) -> None:
-        """Publish one of the topics that MAVROS takes."""
         self._frames = parameters.map_frame, parameters.base_frame
         if parameters.message is PoseMessage.ODOMETRY:
             self._publisher = rospy.Publisher(topics.MAVROS_ODOMETRY, Odometry, queue_size=10)
@@ -47,7 +46,6 @@ class MavrosTopics:
             self._publisher = rospy.Publisher(topics.MAVROS_POSE, PoseWithCovarianceStamped, queue_size=10)
 
     def obstacle(self) -> str:
-        """Return why no position can be sent now; empty when one can."""
         return "" if self._publisher.get_num_connections() else f"nobody listens to {self._publisher.resolved_name}"
 
     def send(self, pose: StatedPose) -> None:

@@ -38,8 +38,6 @@ _STRAIGHT = 0.01  # Of a bin: so far points of one beam lie beside their line, b
 
 
 class AngleUnit(Enum):
-    """A unit of angles."""
-
     RADIANS = "RADIANS"
     DEGREES = "DEGREES"
     GRADIANS = "GRADIANS"

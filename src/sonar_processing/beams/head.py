@@ -21,7 +21,6 @@ class HeadTurn:
         self.clear()
 
     def clear(self) -> None:
-        """Begin anew with the next beam."""
         self._last: Optional[float] = None
         self._swept = 0.0
         self._steps: List[float] = []

@@ -15,8 +15,6 @@ _REFUSED = "beams refused"
 
 
 class AngleUnitChoice(Enum):
-    """Unit of the head's angle in the messages."""
-
     TYPE = "TYPE"
     RADIANS = "RADIANS"
     DEGREES = "DEGREES"
@@ -24,8 +22,6 @@ class AngleUnitChoice(Enum):
 
 
 class HeadTurns(Enum):
-    """Which way the angles in the messages grow, seen from the tip of +z of their frame."""
-
     TYPE = "TYPE"
     COUNTER_CLOCKWISE = "COUNTER_CLOCKWISE"
     CLOCKWISE = "CLOCKWISE"
@@ -33,8 +29,6 @@ class HeadTurns(Enum):
 
 @dataclass(frozen=True)
 class BeamMessageParameters(ParameterSet):
-    """How the angles in messages of beams are understood."""
-
     angle_unit: AngleUnitChoice = parameter(
         AngleUnitChoice.TYPE,
         "unit of the head's angle; TYPE: as documented for the message type, or gradians where the values show them",

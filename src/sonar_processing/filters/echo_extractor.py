@@ -45,8 +45,6 @@ class ExtractionMode(Enum):
 
 @dataclass(frozen=True)
 class EchoExtractorParameters(ParameterSet):
-    """Parameters of echo_extractor."""
-
     mode: ExtractionMode = parameter(
         ExtractionMode.AUTO,
         "which points of an echo are kept: its peak, its beginning, or points all along it; AUTO: peaks, or points all "
@@ -75,7 +73,6 @@ class EchoExtractorParameters(ParameterSet):
 
     @property
     def is_settled(self) -> bool:
-        """Whether nothing is left to be found out from the echoes."""
         return self.mode is not ExtractionMode.AUTO and self.pulse_sigma > 0.0
 
     def settled(self, heard: EchoStatistics) -> "EchoExtractorParameters":

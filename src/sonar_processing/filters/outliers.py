@@ -11,8 +11,6 @@ from sonar_processing.cloud import Cloud
 
 
 class OutlierMode(Enum):
-    """Which rule removes points."""
-
     STATISTICAL = "STATISTICAL"
     RADIUS = "RADIUS"
     NONE = "NONE"
@@ -20,8 +18,6 @@ class OutlierMode(Enum):
 
 @dataclass(frozen=True)
 class OutlierRemoverParameters(ParameterSet):
-    """Parameters of outlier_remover."""
-
     mode: OutlierMode = parameter(OutlierMode.STATISTICAL, "which rule removes points", thesis_name="mode")
     mean_k: int = parameter(
         20, "STATISTICAL: nearest neighbours whose mean distance counts", low=1, high=1000, thesis_name="meanK"

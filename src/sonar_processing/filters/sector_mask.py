@@ -12,8 +12,6 @@ from sonar_processing.cloud import Cloud, SonarPoses
 
 @dataclass(frozen=True)
 class SectorMaskParameters(StampParameters):
-    """Parameters of sector_mask."""
-
     sonar_frame: str = parameter("sonar", "frame of the sonar in tf", tunable=False)
     start_angle: float = parameter(
         0.0, "head angle, counter-clockwise from the sonar's x axis, at which the sector begins", unit="rad",

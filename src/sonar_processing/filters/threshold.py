@@ -12,8 +12,6 @@ from sonar_processing.cloud import HIGHEST_STRENGTH, Cloud
 
 
 class ThresholdMode(Enum):
-    """How the threshold is chosen."""
-
     OTSU = "OTSU"
     FIXED = "FIXED"
     PROPORTIONAL = "PROPORTIONAL"
@@ -22,8 +20,6 @@ class ThresholdMode(Enum):
 
 @dataclass(frozen=True)
 class ThresholderParameters(ParameterSet):
-    """Parameters of thresholder."""
-
     mode: ThresholdMode = parameter(ThresholdMode.OTSU_PROPORTIONAL, "how the threshold is chosen", thesis_name="mode")
     fixed_threshold: float = parameter(
         66.0, "threshold of mode FIXED", unit="echo strength", low=0.0, high=255.0, thesis_name="fixedThresholdValue"

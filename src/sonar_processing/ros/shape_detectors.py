@@ -11,7 +11,7 @@ from visualization_msgs.msg import MarkerArray
 
 from node_support import topics
 from node_support.errors import RefusedInput
-from node_support.ros.callbacks import guarded, make_health
+from node_support.ros.callbacks import guarded, make_health, on_change
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from sonar_processing.cloud import Cloud, CloudSink
 from sonar_processing.ros.cloud_topics import PointsPublisher, SonarPlaces, report_broken, subscribe_to_clouds
@@ -23,7 +23,6 @@ from underwater_map_construction.msg import Circles, Walls
 
 QUEUE_SIZE = 10
 _WAITING = 10  # clouds: as many as wait for a detector that is a node of its own
-_WAIT = 0.5  # s: clouds wake the thread; this is for shutdown alone
 
 
 class ShapeDetectorNode(ABC):
@@ -86,8 +85,6 @@ class ShapeDetectorNode(ABC):
 
 
 class LineDetectorNode(ShapeDetectorNode):
-    """line_detector."""
-
     name, input_topic, topic = "line_detector", topics.CLEANED, topics.LINES
     what = "walls"
     parameters, detector, message = LineDetectorParameters, LineDetector, Walls
@@ -106,8 +103,6 @@ class LineDetectorNode(ShapeDetectorNode):
 
 
 class CircleDetectorNode(ShapeDetectorNode):
-    """circle_detector."""
-
     name, input_topic, topic = "circle_detector", topics.THRESHOLDED, topics.CIRCLES
     what = "circles"
     parameters, detector, message = CircleDetectorParameters, CircleDetector, Circles
@@ -133,21 +128,19 @@ class DetectorQueue:
         self._health = detector.health
         self._process: Callable[[Cloud], None] = guarded(detector.health, detector.process)
         self._clouds: Deque[Cloud] = deque(maxlen=_WAITING)
-        self._condition = threading.Condition()
-        threading.Thread(target=self._work, daemon=True).start()
+        self._lock = threading.Lock()
+        self._notify = on_change(0.0, self._work, detector.health)
 
     def take(self, cloud: Cloud) -> None:
         """Queue a cloud; returns at once. The oldest one that waits goes when there are too many."""
-        with self._condition:
+        with self._lock:
             if len(self._clouds) == _WAITING:
                 self._health.problem("clouds dropped", f"{_WAITING} newer ones wait, the machine is too slow")
             self._clouds.append(cloud)
-            self._condition.notify()
+        self._notify()
 
     def _work(self) -> None:
-        while not rospy.core.is_shutdown_requested():
-            with self._condition:
-                self._condition.wait_for(lambda: self._clouds, _WAIT)
-                cloud = self._clouds.popleft() if self._clouds else None
-            if cloud is not None:
-                self._process(cloud)
+        while self._clouds and not rospy.core.is_shutdown_requested():
+            with self._lock:
+                cloud = self._clouds.popleft()
+            self._process(cloud)

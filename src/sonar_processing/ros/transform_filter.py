@@ -15,7 +15,7 @@ from node_support.errors import RefusedInput
 from node_support.geometry import quaternion_of
 from node_support.headers import JUMP_BACK
 from node_support.health import Health
-from node_support.ros.callbacks import guarded
+from node_support.ros.callbacks import guarded, on_change
 from node_support.ros.transforms import TfBuffer
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.beam_queue import BeamQueue, WaitingBeam
@@ -23,7 +23,7 @@ from sonar_processing.beams.parameters import MountingParameters
 
 _PATIENCE = 0.5  # s: whoever knows the frame and has started sends it at once, because /tf_static is latched
 _FEWEST = 10  # Beams of one frame that wait: a few may be broken messages
-_WAIT = 0.5  # s: beams and transforms wake the thread; this is for shutdown alone
+
 _CACHE = 180.0  # s that tf remembers: longer than the beams that wait, also while a busy machine takes none of them
 
 
@@ -90,15 +90,14 @@ class TransformFilter:
         self._target_frame = target_frame
         self._health = health
         self._on_beam, self._on_time_jump = guarded(health, on_beam), guarded(health, on_time_jump)
-        self._condition = threading.Condition()
+        self._lock = threading.Lock()
         self._queue = BeamQueue()
         self._newest_ns: Optional[int] = None
         self._jumped = False
         self._has_placed = False
-        self._has_news = False
-        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, self._notify, target_frame)
-        self._take = guarded(health, self._deliver_ready)
-        threading.Thread(target=self._work, daemon=True).start()
+        with self._lock:  # so that no delivery looks for tf before it is there
+            self._notify = on_change(0.0, self._deliver_ready, health)
+            self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, self._notify, target_frame)
 
     def add(self, beam: Beam, is_moving: bool = False) -> None:
         """Queue a beam and whether the vehicle moved when it came; returns at once.
@@ -107,7 +106,7 @@ class TransformFilter:
         beam out of order.
         """
         self._transforms.check_stamp(beam.stamp_ns)
-        with self._condition:
+        with self._lock:
             if self._newest_ns is not None and beam.stamp_ns < self._newest_ns:
                 self._take_older(beam)
             if beam.stamp_ns == self._newest_ns and self._transforms.clock.stands_at(beam.stamp_ns):
@@ -118,19 +117,18 @@ class TransformFilter:
             if dropped is not None:
                 reason = self._obstacle(dropped.beam) or "many newer beams wait, the machine is too slow"
                 self._drop(dropped.beam, reason)
-            self._notify()
+        self._notify()
 
     def make_room(self, beams: int) -> None:
-        """Let so many beams wait that come at once: those of a whole turn in one message."""
-        with self._condition:
+        with self._lock:
             self._queue.make_room(beams)
 
     def forget(self) -> None:
         """Forget the waiting beams and the unfinished scan, because they were read wrongly."""
-        with self._condition:
+        with self._lock:
             self._queue.clear()
             self._jumped = True
-            self._notify()
+        self._notify()
 
     def _take_older(self, beam: Beam) -> None:
         seconds = (self._newest_ns - beam.stamp_ns) * 1e-9
@@ -140,20 +138,8 @@ class TransformFilter:
         self._jumped = True
         self._health.problem("jumps back in time", f"by {seconds:.1f} s; the unfinished scan is forgotten")
 
-    def _notify(self) -> None:
-        with self._condition:
-            self._has_news = True
-            self._condition.notify()
-
-    def _work(self) -> None:
-        while not rospy.core.is_shutdown_requested():
-            with self._condition:
-                self._condition.wait_for(lambda: self._has_news, _WAIT)
-                self._has_news = False
-            self._take()
-
     def _deliver_ready(self) -> None:
-        with self._condition:
+        with self._lock:
             jumped, self._jumped = self._jumped, False
             if self._mount is not None and self._mount.is_wanted:
                 self._mount.look_at(self._queue.frames(), self._transforms)

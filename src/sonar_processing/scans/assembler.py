@@ -198,7 +198,6 @@ class MovingState:
         self.was_heard, self._since_ns = True, None
 
     def is_moving(self, parameters: SonarToCloudParameters) -> bool:
-        """Whether the vehicle is faster than the dead band; without any velocity it is still."""
         return self._speed > parameters.still_speed or self._turn_rate > parameters.still_turn_rate
 
     def age(self, stamp_ns: int) -> float:

@@ -20,8 +20,6 @@ _WIDEST_STEP = 0.2  # rad: a wider step is no step but a gap, as where a sector 
 
 @dataclass(frozen=True)
 class SonarImageParameters(BeamMessageParameters):
-    """Parameters of sonar_image."""
-
     metres_per_pixel: float = parameter(
         0.0, f"size of a pixel; 0: the range fits into {_USUAL_PIXELS} pixels", unit="m", low=0.0, high=10.0
     )

@@ -31,15 +31,11 @@ class ScanMode(Enum):
 
 
 class LaserPick(Enum):
-    """Which bin of a beam is the one that a laser would have seen."""
-
     STRONGEST = "STRONGEST"
     FIRST = "FIRST"
 
 
 class VelocityType(Enum):
-    """What is published on the velocity topic."""
-
     TWIST = "TWIST"
     TWIST_STAMPED = "TWIST_STAMPED"
     ODOMETRY = "ODOMETRY"
@@ -98,8 +94,6 @@ class ScanParameters(ParameterSet):
 class SonarToCloudParameters(
     MountingParameters, BeamMessageParameters, BeamCorrection, ScanParameters, StampParameters
 ):
-    """Parameters of sonar_to_cloud."""
-
     sonar_turned: float = parameter(
         0.0, "how far the sonar is turned against tf, counter-clockwise seen from above, as mlsm_core names it",
         unit="rad", low=-2.0 * math.pi, high=2.0 * math.pi,

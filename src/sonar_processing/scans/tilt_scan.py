@@ -15,16 +15,12 @@ from sonar_processing.beams.reader import BeamMessageParameters
 
 
 class ControlMode(Enum):
-    """What the servo is for."""
-
     STATIC_MAPPING = "STATIC_MAPPING"
     HORIZONTAL = "HORIZONTAL"
 
 
 @dataclass(frozen=True)
 class SonarControlParameters(BeamMessageParameters):
-    """Parameters of sonar_control."""
-
     mode: ControlMode = parameter(
         ControlMode.STATIC_MAPPING, "STATIC_MAPPING: step through the range; HORIZONTAL: stay at horizontal_deg"
     )

@@ -36,8 +36,6 @@ _RANGE_DEVIATION, _BEARING_DEVIATION = 0.1, 0.15  # m, standard deviations of a 
 
 @dataclass(frozen=True)
 class CircleDetectorParameters(RansacParameters):
-    """Parameters of circle_detector."""
-
     n_circles: int = parameter(10, "circles looked for in a scan, at most", low=1, high=100)
     min_radius: float = parameter(0.2, "smallest radius of a circle", unit="m", low=0.01, high=100.0)
     max_radius: float = parameter(0.6, "largest radius of a circle", unit="m", low=0.01, high=100.0)
@@ -145,7 +143,6 @@ class CircleDetector:
         self.parameters = parameters
 
     def __call__(self, cloud: Cloud, sonar_positions: SonarPositions) -> List[Circle]:
-        """Return the circles of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
         strong = echoes.strong(self.parameters.min_echo_share)
         if not len(strong):

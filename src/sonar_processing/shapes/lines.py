@@ -16,8 +16,6 @@ _PARTS = 8
 
 @dataclass(frozen=True)
 class LineDetectorParameters(RansacParameters):
-    """Parameters of line_detector."""
-
     n_walls: int = parameter(4, "walls looked for in a scan, at most", low=1, high=100, thesis_name="nWalls")
     min_inliers: int = parameter(6, "echoes that make a wall", low=2, high=10000)
     min_length: float = parameter(4.0, "a wall is at least this long", unit="m", low=0.0, high=1000.0)
@@ -100,7 +98,6 @@ class LineDetector:
         self.parameters = parameters
 
     def __call__(self, cloud: Cloud) -> List[Line]:
-        """Return the walls of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
         rng = np.random.default_rng(self.parameters.seed)
         left = echoes.strong(self.parameters.min_echo_share)

@@ -22,7 +22,7 @@ def cloud_of(strengths, height=1):
 def beam_of(strengths=(10, 20, 30), angle=0.0, resolution=1.0, seconds=1, sensor_angle=0.0):
     """Return a beam with bins of one metre."""
     return Beam(
-        stamp_ns=seconds * SECOND,
+        stamp_ns=round(seconds * SECOND),
         frame_id="sonar",
         angle=angle,
         intensities=np.array(strengths, dtype=np.uint8),

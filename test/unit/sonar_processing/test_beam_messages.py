@@ -69,12 +69,27 @@ def echoes_at(angles, **parameters):
     return [reader.read(ECHO, sonar_echo_of(angle)) for angle in angles]
 
 
-@pytest.mark.parametrize("intensities", [bytes([1, 2, 255]), [1, 2, 255]])
-@pytest.mark.parametrize("name", [OWN, "avora_msgs/SonarScanLine"])
-def test_our_own_message_is_taken_as_it_is(name, intensities):
-    found = beam(name, scan_line_of(intensities=intensities))
-    assert (found.stamp_ns, found.frame_id, found.angle, found.sensor_angle) == (STAMP_NS, "sonar", 0.5, -0.125)
-    assert (found.intensities.tolist(), found.range_resolution) == ([1, 2, 255], 0.25)
+@pytest.mark.parametrize(
+    ("kind", "message", "frame", "angle", "resolution", "strengths"),
+    [
+        (OWN, scan_line_of(), "sonar", 0.5, 0.25, [1, 2, 255]),
+        ("avora_msgs/SonarScanLine", scan_line_of(intensities=[1, 2, 255]), "sonar", 0.5, 0.25, [1, 2, 255]),
+        (ECHO, sonar_echo_of(0.5), "sonar_frame", 0.5, 5.0, [0, 10, 200, 3]),
+        *((PING_360, ping_360_of(100 * n), "ping360", (2 - n) * math.pi / 2, 0.5, [5, 6, 7, 8]) for n in (1, 2, 3)),
+        (MICRON, micron_line_of(-90.0), "Micron", -math.pi / 2, 0.05, [1, 2, 3]),
+        (POINT_CLOUD, point_cloud_of(bearing=2.0), "sonar", 2.0, 0.05, [1, 2, 3]),
+        (RAW, raw_sonar_image_of(2.0), "sonar", 2.0, 0.05, [0, 1, 2, 3]),
+        (PROJECTED, projected_sonar_image_of(2.0), "sonar", 2.0, 0.05, [0, 1, 2, 3]),
+    ],
+)
+def test_a_message_becomes_the_beam_that_it_holds(kind, message, frame, angle, resolution, strengths):
+    found = beam(kind, message)
+    assert (found.frame_id, found.intensities.tolist()) == (frame, strengths)
+    assert (found.angle, found.range_resolution) == (pytest.approx(angle), pytest.approx(resolution))
+
+
+def test_our_own_message_tells_the_tilt():
+    assert beam(OWN, scan_line_of()).sensor_angle == -0.125
 
 
 @pytest.mark.parametrize("maxrange", [0.0, -1.0, math.nan])
@@ -83,45 +98,12 @@ def test_our_own_message_needs_a_range(maxrange):
         reading(OWN, scan_line_of(maxrange_meters=maxrange))
 
 
-def test_a_ping_360_of_the_ping360_sonar_package():
-    found = beam(ECHO, sonar_echo_of(0.5))
-    assert (found.frame_id, found.angle, found.range_resolution) == ("sonar_frame", 0.5, 5.0)
-    assert found.intensities.tolist() == [0, 10, 200, 3]
-
-
-def test_a_ping_360_of_the_bluerobotics_sonar_package():
-    found = beam(PING_360, ping_360_of(100))
-    assert (found.frame_id, found.range_resolution) == ("ping360", 0.5)
-    assert found.angle == pytest.approx(math.pi / 2)
-    assert beam(PING_360, ping_360_of(200)).angle == 0.0
-    assert beam(PING_360, ping_360_of(300)).angle == pytest.approx(-math.pi / 2)
-
-
-def test_a_micron_of_the_micron_driver_ros_package():
-    found = beam(MICRON, micron_line_of(-90.0))
-    assert (found.frame_id, found.range_resolution, found.intensities.tolist()) == ("Micron", 0.05, [1, 2, 3])
-    assert found.angle == pytest.approx(-math.pi / 2)
-
-
-def test_a_micron_of_the_tritech_micron_package():
-    found = beam(POINT_CLOUD, point_cloud_of(bearing=2.0))
-    assert (found.angle, found.range_resolution) == (pytest.approx(2.0), pytest.approx(0.05))
-    assert found.intensities.tolist() == [1, 2, 3]
-
-
 def test_a_cloud_that_is_no_single_beam_is_refused():
     bent = point_cloud_of()
     bent.points[1].x += 0.01
     for cloud in (bent, point_cloud_of(channels=[]), point_cloud_of(points=[])):
         with pytest.raises(RefusedInput, match="must be one beam"):
             reading(POINT_CLOUD, cloud)
-
-
-@pytest.mark.parametrize("kind", [RAW, PROJECTED])
-def test_a_picture_of_one_beam_is_that_beam(kind):
-    found = beam(kind, MADE[kind](angle=2.0))
-    assert (found.stamp_ns, found.angle, found.range_resolution) == (STAMP_NS, pytest.approx(2.0), pytest.approx(0.05))
-    assert found.intensities.tolist() == [0, 1, 2, 3]
 
 
 @pytest.mark.parametrize("kind", [RAW, PROJECTED])
@@ -159,6 +141,11 @@ def test_types_are_known_by_their_names_in_ros_2(ros_2_name):
 @pytest.mark.parametrize(("kind", "seconds"), [(ECHO, 40 / 1480), (PING_360, 4 / 1500), (MICRON, 0.3 / 1500)])
 def test_a_stamp_taken_after_the_reply_goes_back_to_the_ping(kind, seconds):
     assert beam(kind, MADE[kind]()).stamp_ns == pytest.approx(STAMP_NS - seconds * SECOND, abs=1)
+
+
+@pytest.mark.parametrize("kind", [OWN, RAW, PROJECTED])
+def test_a_stamp_of_the_ping_stays(kind):
+    assert beam(kind, MADE[kind]()).stamp_ns == STAMP_NS
 
 
 def test_a_laser_scan_becomes_one_beam_per_ray_with_one_echo():
@@ -214,19 +201,16 @@ def test_a_unit_that_turns_out_to_be_another_is_told():
     assert "radians" in found[2].notes[0]
 
 
-def test_the_unit_can_be_set():
-    assert beam(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").angle == pytest.approx(3.0 * math.pi / 200.0)
-    assert beam(ECHO, sonar_echo_of(90.0), angle_unit="DEGREES").angle == pytest.approx(math.pi / 2)
-    assert beam(ECHO, sonar_echo_of(400.0), angle_unit="RADIANS").angle == 400.0
+@pytest.mark.parametrize(("unit", "angle"), [("GRADIANS", math.pi / 2), ("DEGREES", math.pi / 1.8), ("RADIANS", 100.0)])
+def test_a_unit_that_is_set_is_taken_and_not_said_to_be_told_by_values(unit, angle):
+    found = reading(ECHO, sonar_echo_of(100.0), angle_unit=unit)
+    assert found.beams[0].angle == pytest.approx(angle)
+    assert "told by" not in found.notes[0]
 
 
-def test_a_unit_that_was_set_is_not_said_to_be_told_by_values():
-    assert "told by" not in reading(ECHO, sonar_echo_of(3.0), angle_unit="GRADIANS").notes[0]
-
-
-def test_the_direction_can_be_set():
-    assert beam(MICRON, micron_line_of(90.0), head_turns="CLOCKWISE").angle == pytest.approx(-math.pi / 2)
-    assert beam(MICRON, micron_line_of(90.0), head_turns="COUNTER_CLOCKWISE").angle == pytest.approx(math.pi / 2)
+@pytest.mark.parametrize(("turns", "sign"), [("CLOCKWISE", -1), ("COUNTER_CLOCKWISE", 1)])
+def test_the_direction_can_be_set(turns, sign):
+    assert beam(MICRON, micron_line_of(90.0), head_turns=turns).angle == pytest.approx(sign * math.pi / 2)
 
 
 def test_what_is_assumed_of_a_type_is_said_once():

@@ -3,6 +3,7 @@
 import math
 from collections import Counter
 
+import pytest
 from clouds import beam_of
 from hypothesis import given
 from hypothesis import strategies as st
@@ -31,12 +32,9 @@ def test_a_head_that_turns_round_and_round_is_unremarkable(first, step):
     assert events_of(range(first, first + 1000 * step, step)) == Counter()
 
 
-def test_a_head_that_sweeps_a_sector_is_unremarkable():
-    assert events_of(sweeps(-60, 60, 8)) == Counter()
-
-
-def test_a_head_that_swings_through_a_whole_turn_is_unremarkable():
-    assert events_of(sweeps(0, 400, 6)) == Counter()
+@pytest.mark.parametrize("sector", [(-60, 60, 8), (0, 400, 6)])
+def test_a_head_that_sweeps_a_sector_or_a_whole_turn_is_unremarkable(sector):
+    assert events_of(sweeps(*sector)) == Counter()
 
 
 @given(st.sets(st.integers(2, 190), min_size=1, max_size=20))

@@ -4,9 +4,8 @@ import math
 
 import numpy as np
 import pytest
-from clouds import SECOND, beam_of
+from clouds import SECOND, placed
 
-from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.polar_scan import PolarScan, planar_laser_scan, usual_rays
 
@@ -14,28 +13,21 @@ RAYS, BINS, RESOLUTION = 120, 100, 0.1
 STEP = 2 * math.pi / RAYS
 
 
-def _pose(x=0.0, y=0.0, yaw=0.0, z=0.0):
-    pose = np.eye(4)
-    pose[:2, :2] = [[math.cos(yaw), -math.sin(yaw)], [math.sin(yaw), math.cos(yaw)]]
-    pose[:3, 3] = x, y, z
-    return pose
-
-
-def _strengths(distance, strength=100):
+def _strengths(distance):
     strengths = np.full(BINS, 3, np.uint8)
     index = int(distance / RESOLUTION)
     if index < BINS:
-        strengths[index] = strength
+        strengths[index] = 100
     return strengths
 
 
-def _scan(distances, numbers=None, poses=None):
+def _scan(distances, numbers=None, shifts=None):
     """Return a scan whose beam k looks at k * 3 deg and hears an echo at its distance."""
     numbers = range(len(distances)) if numbers is None else numbers
-    poses = [np.eye(4)] * len(distances) if poses is None else poses
+    shifts = np.zeros((len(distances), 3)) if shifts is None else shifts
     return PolarScan.of([
-        PlacedBeam(beam_of(_strengths(distance), number * STEP, RESOLUTION, seconds), pose, is_moving=False)
-        for seconds, (distance, number, pose) in enumerate(zip(distances, numbers, poses), 1)
+        placed(strengths=_strengths(distance), angle=number * STEP, resolution=RESOLUTION, seconds=seconds, shift=shift)
+        for seconds, (distance, number, shift) in enumerate(zip(distances, numbers, shifts), 1)
     ])  # fmt: skip
 
 
@@ -47,9 +39,9 @@ def _angles(turn):
     return -math.pi + np.arange(turn.ranges.size) * turn.angle_increment
 
 
-def test_rays_go_round_from_minus_pi_in_steps_of_the_head():
+def test_rays_go_round_from_minus_pi_in_steps_of_the_head_and_take_as_long_as_it():
     turn = _laser(_scan(np.full(RAYS, 5.0)))
-    assert turn.ranges.size == RAYS
+    assert (turn.ranges.size, turn.duration) == (RAYS, pytest.approx(RAYS - 1))
     assert turn.angle_increment == pytest.approx(STEP)
     np.testing.assert_allclose(turn.ranges, 5.05, atol=1e-5)
 
@@ -92,10 +84,6 @@ def test_the_first_strong_bin_can_be_taken_instead_of_the_strongest():
     assert _laser(scan, laser_pick="FIRST", laser_first_above=70.0).ranges.max() == pytest.approx(8.05)
 
 
-def test_the_duration_is_that_of_the_turn():
-    assert _laser(_scan(np.full(RAYS, 5.0))).duration == pytest.approx(RAYS - 1)
-
-
 def test_a_fixed_number_of_rays_can_be_asked_for():
     assert _laser(_scan(np.full(RAYS, 5.0)), laser_scan_rays=360).ranges.size == 360
 
@@ -106,7 +94,8 @@ def test_gaps_do_not_change_the_number_of_rays():
 
 
 def test_the_cloud_of_a_turn_has_a_row_per_beam_placed_by_its_pose():
-    cloud = _scan([5.0, 5.0], poses=[_pose(x=1.0), _pose(y=2.0, z=-3.0)]).cloud(SonarToCloudParameters(min_range=0.2))
+    scan = _scan([5.0, 5.0], shifts=[(1.0, 0.0, 0.0), (0.0, 2.0, -3.0)])
+    cloud = scan.cloud(SonarToCloudParameters(min_range=0.2))
     rows = cloud.points.reshape(2, BINS, 4)
     assert (cloud.height, cloud.frame_id, cloud.stamp_ns, cloud.is_organized) == (2, "odom", 2 * SECOND, True)
     np.testing.assert_allclose(rows[0, 2], [1.25, 0.0, 0.0, 3.0], atol=1e-6)
@@ -117,6 +106,7 @@ def test_the_cloud_of_a_turn_has_a_row_per_beam_placed_by_its_pose():
 
 
 def test_the_height_limit_removes_bins_of_a_turn():
-    cloud = _scan([5.0, 5.0], poses=[_pose(z=1.0), _pose(z=-1.0)]).cloud(SonarToCloudParameters(height_limit=0.0))
+    scan = _scan([5.0, 5.0], shifts=[(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)])
+    cloud = scan.cloud(SonarToCloudParameters(height_limit=0.0))
     assert np.isnan(cloud.points.reshape(2, BINS, 4)[0]).all()
     assert np.isfinite(cloud.points.reshape(2, BINS, 4)[1, 10:]).all()

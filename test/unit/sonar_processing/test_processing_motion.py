@@ -10,9 +10,10 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 
 PARAMETERS = SonarToCloudParameters(still_speed=0.05, still_turn_rate=0.01)
 SECOND = 10**9
+ZERO = (0.0, 0.0, 0.0)
 
 
-def _motion(linear=(0.0, 0.0, 0.0), angular=(0.0, 0.0, 0.0)):
+def _motion(linear=ZERO, angular=ZERO):
     motion = MovingState()
     motion.take(linear, angular)
     return motion
@@ -23,25 +24,23 @@ def test_a_vehicle_never_heard_of_is_still():
     assert (motion.was_heard, motion.is_moving(PARAMETERS)) == (False, False)
 
 
-@pytest.mark.parametrize("linear", [(0.06, 0, 0), (0, -0.06, 0), (0, 0, 0.06), (0.04, 0.04, 0)])
-def test_a_speed_above_the_dead_band_is_moving(linear):
-    assert _motion(linear=linear).is_moving(PARAMETERS)
-
-
-@pytest.mark.parametrize("angular", [(0, 0, 0.02), (-0.02, 0, 0)])
-def test_a_turn_rate_above_the_dead_band_is_moving(angular):
-    assert _motion(angular=angular).is_moving(PARAMETERS)
-
-
-def test_noise_within_the_dead_band_is_still():
-    assert not _motion((0.03, -0.03, 0.02), (0.0, 0.0, 0.009)).is_moving(PARAMETERS)
+@pytest.mark.parametrize(
+    ("linear", "angular", "is_moving"),
+    [
+        *((linear, ZERO, True) for linear in ((0.06, 0, 0), (0, -0.06, 0), (0, 0, 0.06), (0.04, 0.04, 0))),
+        *((ZERO, angular, True) for angular in ((0, 0, 0.02), (-0.02, 0, 0))),
+        ((0.03, -0.03, 0.02), (0.0, 0.0, 0.009), False),
+    ],
+)
+def test_a_velocity_above_the_dead_band_is_moving(linear, angular, is_moving):
+    assert _motion(linear, angular).is_moving(PARAMETERS) is is_moving
 
 
 @pytest.mark.parametrize("bad", [math.nan, math.inf])
 def test_a_velocity_that_is_none_is_refused_and_the_last_one_stays(bad):
     motion = _motion(linear=(1.0, 0.0, 0.0))
     with pytest.raises(RefusedInput) as refused:
-        motion.take((bad, 0.0, 0.0), (0.0, 0.0, 0.0))
+        motion.take((bad, 0.0, 0.0), ZERO)
     assert refused.value.kind == "velocities refused"
     assert motion.is_moving(PARAMETERS)
 
@@ -49,7 +48,7 @@ def test_a_velocity_that_is_none_is_refused_and_the_last_one_stays(bad):
 def test_the_age_of_a_velocity_is_counted_in_the_time_of_the_beams():
     motion = _motion()
     assert [motion.age(seconds * SECOND) for seconds in (100, 101, 103)] == [0.0, 1.0, 3.0]
-    motion.take((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+    motion.take(ZERO, ZERO)
     assert motion.age(104 * SECOND) == 0.0
 
 

@@ -48,12 +48,9 @@ def test_it_is_the_mean_of_the_first_and_the_last_maximum(strategy, data):
     assert otsu_threshold(np.array(levels)) == literal_threshold(levels)
 
 
-def test_strengths_outside_the_levels_count_in_the_nearest():
-    assert otsu_threshold(np.array([-50.0, 1000.0])) == literal_threshold([0, 255])
-
-
-def test_fractions_of_a_level_count_in_the_level_below():
-    assert otsu_threshold(np.array([10.9, 20.2])) == literal_threshold([10, 20])
+@pytest.mark.parametrize(("strengths", "levels"), [([-50.0, 1000.0], [0, 255]), ([10.9, 20.2], [10, 20])])
+def test_strengths_outside_the_levels_count_in_the_nearest_and_fractions_in_the_level_below(strengths, levels):
+    assert otsu_threshold(np.array(strengths)) == literal_threshold(levels)
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.float32, np.float64, np.int64])
@@ -70,10 +67,6 @@ def test_no_strengths_are_refused():
     with pytest.raises(RefusedInput) as refused:
         otsu_threshold(np.empty(0))
     assert refused.value.kind == "clouds without points"
-
-
-def _kept(strengths, **values):
-    return Thresholder(ThresholderParameters(**values))(cloud_of(strengths)).points[:, 3].tolist()
 
 
 def _threshold(strengths, **values):
@@ -105,12 +98,8 @@ def test_each_mode_weighs_by_its_own_parameters(mode, values, threshold):
 
 
 @pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
-def test_no_mode_goes_below_the_floor(mode):
+def test_no_mode_goes_below_the_floor_which_lowers_no_threshold(mode):
     assert _threshold([1, 2, 3], mode=mode, fixed_threshold=0.5, min_threshold=40) == 40
-
-
-@pytest.mark.parametrize("mode", [mode.value for mode in ThresholdMode])
-def test_the_floor_does_not_lower_a_threshold(mode):
     values = {"mode": mode, "fixed_threshold": 120.0}
     assert _threshold([90, 90, 250], min_threshold=10, **values) == _threshold([90, 90, 250], **values) > 10
 
@@ -144,29 +133,20 @@ def test_clouds_of_messages_which_cannot_be_written_are_taken():
 
 
 @given(STRENGTHS)
-def test_stamps_go_with_their_points(strengths):
+def test_stamps_go_with_their_points_and_the_header_stays(strengths):
     kept = Thresholder(ThresholderParameters())(cloud_of(strengths))
     np.testing.assert_array_equal(kept.time_stamps, kept.points[:, 0] + 1.0)
+    assert (kept.stamp_ns, kept.frame_id) == (5 * 10**9, "odom")
 
 
-def test_an_organised_cloud_keeps_its_shape_and_its_stamps():
+def test_an_organised_cloud_keeps_its_shape_and_its_stamps_and_the_one_given_is_not_changed():
     cloud = cloud_of([10, 100, 20, 200, 30, 90], height=2)
+    before = cloud.points.copy()
     kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
     assert (kept.height, len(kept), kept.is_organized) == (2, 6, True)
     assert np.isnan(kept.points).all(axis=1).tolist() == [True, False, True, False, True, False]
     assert kept.time_stamps.tolist() == cloud.time_stamps.tolist()
-
-
-def test_the_cloud_given_is_not_changed():
-    cloud = cloud_of([10, 100, 20, 200], height=2)
-    before = cloud.points.copy()
-    Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
     np.testing.assert_array_equal(cloud.points, before)
-
-
-def test_header_and_frame_are_those_of_the_scan():
-    kept = Thresholder(ThresholderParameters())(cloud_of([1, 200]))
-    assert (kept.stamp_ns, kept.frame_id) == (5 * 10**9, "odom")
 
 
 def test_the_newest_threshold_can_be_read():
@@ -182,22 +162,19 @@ def test_the_newest_threshold_can_be_read():
 @pytest.mark.parametrize("nonzero", [True, False])
 @pytest.mark.parametrize("strength", [1, 127, 255])
 def test_echoes_that_are_all_equally_strong_pass(mode, nonzero, strength):
-    assert _kept([0, strength, 0, strength], mode=mode, otsu_nonzero=nonzero) == [strength, strength]
+    kept = Thresholder(ThresholderParameters(mode=mode, otsu_nonzero=nonzero))(cloud_of([0, strength, 0, strength]))
+    assert kept.points[:, 3].tolist() == [strength, strength]
 
 
-def _noticed(scans):
-    """Return the numbers of the scans, from 1 on, at which a stage is noticed."""
+@pytest.mark.parametrize(
+    ("scans", "noticed"),
+    [
+        ([(5, 0)] * 35, [10, 20, 30]),
+        ([(5, 0)] * 9 + [(5, 1)] + [(5, 0)] * 9, []),
+        ([(5, 0)] * 9 + [(0, 0)] * 5 + [(5, 0), (0, 0)], [15]),
+    ],
+    ids=["none has a point left", "one has, which begins the count anew", "some come without points"],
+)
+def test_every_tenth_scan_in_a_row_that_loses_all_its_points_is_noticed(scans, noticed):
     emptied = EmptiedScans()
-    return [number for number, (before, after) in enumerate(scans, 1) if emptied.take(before, after)]
-
-
-def test_every_tenth_scan_in_a_row_without_a_point_is_noticed():
-    assert _noticed([(5, 0)] * 35) == [10, 20, 30]
-
-
-def test_one_point_that_passes_begins_the_count_anew():
-    assert not _noticed([(5, 0)] * 9 + [(5, 1)] + [(5, 0)] * 9)
-
-
-def test_scans_that_come_without_points_are_not_counted():
-    assert _noticed([(5, 0)] * 9 + [(0, 0)] * 5 + [(5, 0), (0, 0)]) == [15]
+    assert [number for number, counts in enumerate(scans, 1) if emptied.take(*counts)] == noticed

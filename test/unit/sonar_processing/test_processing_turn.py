@@ -1,15 +1,13 @@
 """When a turn of the head is over, and which beams it holds."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
-from clouds import beam_of
+from clouds import placed
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sonar_processing.beams.beam import PlacedBeam
 from sonar_processing.beams.head import HeadTurn
 from sonar_processing.scans.assembler import MOST_BEAMS, RevolutionCollector
 
@@ -19,10 +17,8 @@ STEP = math.radians(3.0)
 def _turns(beams):
     """Return the `seconds` of the beams of every turn; beams are dictionaries for `beam_of`, ten in a second."""
     collector = RevolutionCollector()
-    made = [beam_of(**beam) for beam in beams]
-    made = [replace(beam, stamp_ns=beam.stamp_ns // 10) for beam in made]
-    turns = [collector.add(PlacedBeam(beam, np.eye(4), is_moving=False)) for beam in made]
-    return [[placed.beam.stamp_ns // 10**8 for placed in turn] for turn in turns if turn is not None]
+    turns = [collector.add(placed(**{**beam, "seconds": beam.get("seconds", 1) / 10})) for beam in beams]
+    return [[round(one.beam.stamp_ns * 1e-8) for one in turn] for turn in turns if turn is not None]
 
 
 def _lengths(angles):
@@ -56,8 +52,7 @@ def test_a_head_that_trembles_does_not_go_back():
 
 def test_a_head_that_stands_still_gives_nothing_and_holds_only_the_newest():
     collector = RevolutionCollector()
-    placed = PlacedBeam(beam_of(angle=1.0), np.eye(4), is_moving=False)
-    assert [collector.add(placed) for _ in range(MOST_BEAMS + 10)] == [None] * (MOST_BEAMS + 10)
+    assert [collector.add(placed(angle=1.0)) for _ in range(MOST_BEAMS + 10)] == [None] * (MOST_BEAMS + 10)
     assert len(collector) == MOST_BEAMS
 
 
@@ -69,7 +64,7 @@ def test_a_turn_in_which_the_servo_or_the_range_changed_is_forgotten(change):
 
 def test_clear_forgets_the_beams():
     collector = RevolutionCollector()
-    collector.add(PlacedBeam(beam_of(), np.eye(4), is_moving=False))
+    collector.add(placed())
     collector.clear()
     assert len(collector) == 0
 

@@ -13,15 +13,25 @@ from sonar_processing.scans.parameters import ScanMode
 STEP = math.radians(3.0)
 
 
+def _scans(beams, **values):
+    """Return what an assembler with these parameters makes of each beam, given as `placed` takes it."""
+    assembler = assembler_with(**values)
+    return [assembler.add(placed(**beam)) for beam in beams]
+
+
+def _seconds(scan):
+    """Return the stamps of the beams in a scan, s."""
+    return np.unique(np.abs(scan.time_stamps)).tolist()
+
+
 def _scan_ends(angles, **values):
     """Return after how many beams each scan came, for a head that passes through `angles`."""
-    assembler = assembler_with(scan_size=3600, **values)
-    return [count for count, angle in enumerate(angles, 1) if assembler.add(placed(angle=angle)) is not None]
+    scans = _scans([{"angle": angle} for angle in angles], **{"scan_size": 3600, **values})
+    return [count for count, scan in enumerate(scans, 1) if scan is not None]
 
 
 def test_a_scan_ends_after_scan_size_beams():
-    assembler = assembler_with(scan_size=3)
-    assert [assembler.add(placed()) is not None for _ in range(7)] == [False, False, True, False, False, True, False]
+    assert _scan_ends(np.zeros(7), scan_size=3) == [3, 6]
 
 
 @pytest.mark.parametrize("direction", [1, -1])
@@ -52,15 +62,12 @@ def test_only_whole_turns_end_a_scan_though_a_beam_is_missed(angles, values, end
 @pytest.mark.parametrize("direction", [1, -1])
 def test_the_first_beam_of_a_turn_ends_the_one_before_whose_last_beams_were_lost(lost, direction):
     angles = np.delete(direction * STEP * np.arange(240), lost)
-    assembler = assembler_with(scan_size=3600)
-    scans = [assembler.add(placed(angle=angle, seconds=number)) for number, angle in enumerate(angles, 1)]
-    lengths = [np.unique(scan.time_stamps).size for scan in scans if scan is not None]
-    assert lengths == [120 - len(lost), 120]
+    scans = _scans([{"angle": angle, "seconds": number} for number, angle in enumerate(angles, 1)], scan_size=3600)
+    assert [len(_seconds(scan)) for scan in scans if scan is not None] == [120 - len(lost), 120]
 
 
 def test_the_continuous_modes_go_on_over_the_end_of_a_turn():
-    assembler = assembler_with(mode="LASERCONT", scan_size=200)
-    assert [len(assembler.add(placed(angle=count * STEP)) or ()) for count in range(250)][-1] == 200
+    assert len(_scans([{"angle": count * STEP} for count in range(250)], mode="LASERCONT", scan_size=200)[-1]) == 200
 
 
 def test_steps_that_vary_still_make_a_full_turn():
@@ -70,42 +77,35 @@ def test_steps_that_vary_still_make_a_full_turn():
     assert all(abs(length - 120) <= 2 for length in lengths)
 
 
+def _tilted(*tilts):
+    """Return beams of these tilts of the servo [rad], one a second."""
+    return [{"seconds": seconds, "sensor_angle": tilt} for seconds, tilt in enumerate(tilts, 1)]
+
+
 def test_a_servo_step_ends_the_scan_before_the_beam_that_saw_it():
-    assembler = assembler_with()
-    for seconds in (1, 2):
-        assert assembler.add(placed(seconds=seconds, sensor_angle=0.1)) is None
-    scan = assembler.add(placed(seconds=3, sensor_angle=0.2))
-    assert np.unique(scan.time_stamps).tolist() == [-2.0, -1.0]
-    assert scan.stamp_ns == 2 * SECOND
+    *before, scan = _scans(_tilted(0.1, 0.1, 0.2))
+    assert (before, _seconds(scan), scan.stamp_ns) == ([None, None], [1, 2], 2 * SECOND)
 
 
 def test_the_beam_after_a_servo_step_begins_the_next_scan():
-    assembler = assembler_with(scan_size=2)
-    assembler.add(placed(seconds=1, sensor_angle=0.1))
-    assembler.add(placed(seconds=2, sensor_angle=0.2))
-    scan = assembler.add(placed(seconds=3, sensor_angle=0.2))
-    assert np.unique(scan.time_stamps).tolist() == [-3.0, -2.0]
+    assert _seconds(_scans(_tilted(0.1, 0.2, 0.2), scan_size=2)[-1]) == [2, 3]
 
 
 def test_a_servo_that_trembles_ends_nothing():
-    assembler = assembler_with()
-    assert [assembler.add(placed(sensor_angle=0.0005 * (count % 2))) for count in range(20)] == [None] * 20
+    assert _scans(_tilted(*[0.0, 0.0005] * 10)) == [None] * 20
 
 
 @pytest.mark.parametrize(("mode", "per_beam"), [("SONARCONT", 3), ("LASERCONT", 1)])
 def test_continuous_modes_give_the_newest_scan_size_beams_from_the_first_whole_scan_on(mode, per_beam):
-    assembler = assembler_with(mode=mode, scan_size=3)
-    scans = [assembler.add(placed(seconds=seconds)) for seconds in range(1, 6)]
-    assert scans[:2] == [None, None]
-    assert [np.unique(-scan.time_stamps).tolist() for scan in scans[2:]] == [[1, 2, 3], [2, 3, 4], [3, 4, 5]]
-    assert [len(scan) for scan in scans[2:]] == [3 * per_beam] * 3
+    first, second, *scans = _scans([{"seconds": seconds} for seconds in range(1, 6)], mode=mode, scan_size=3)
+    assert (first, second) == (None, None)
+    assert [_seconds(scan) for scan in scans] == [[1, 2, 3], [2, 3, 4], [3, 4, 5]]
+    assert [len(scan) for scan in scans] == [3 * per_beam] * 3
 
 
 def test_a_servo_step_empties_the_continuous_scan():
-    assembler = assembler_with(mode="SONARCONT", scan_size=2)
-    assembler.add(placed(seconds=1, sensor_angle=0.1))
-    assert assembler.add(placed(seconds=2, sensor_angle=0.2)) is None
-    assert set(assembler.add(placed(seconds=3, sensor_angle=0.2)).time_stamps) == {-2.0, -3.0}
+    _, second, scan = _scans(_tilted(0.1, 0.2, 0.2), mode="SONARCONT", scan_size=2)
+    assert (second, _seconds(scan)) == (None, [2, 3])
 
 
 def test_clear_forgets_the_unfinished_scan():
@@ -113,7 +113,7 @@ def test_clear_forgets_the_unfinished_scan():
     assembler.add(placed(seconds=1))
     assembler.clear()
     assert assembler.add(placed(seconds=2)) is None
-    assert set(assembler.add(placed(seconds=3)).time_stamps) == {-2.0, -3.0}
+    assert _seconds(assembler.add(placed(seconds=3))) == [2, 3]
 
 
 def test_clear_forgets_how_far_the_head_has_turned():
@@ -133,51 +133,44 @@ def test_clear_forgets_the_servo():
 
 
 def test_an_unfinished_scan_before_a_silence_is_forgotten():
-    assembler = assembler_with(scan_size=3)
-    assembler.add(placed(seconds=1))
-    later = [assembler.add(placed(seconds=seconds)) for seconds in (100, 101, 102)]
-    assert later[:2] == [None, None]
-    assert np.unique(np.abs(later[2].time_stamps)).tolist() == [100, 101, 102]
+    *before, scan = _scans([{"seconds": seconds} for seconds in (1, 100, 101, 102)], scan_size=3)
+    assert (before, _seconds(scan)) == ([None] * 3, [100, 101, 102])
+
+
+def _scan_of(*beams, **values):
+    """Return the scan of these beams, which by default come one a second."""
+    return _scans([{"seconds": s, **beam} for s, beam in enumerate(beams, 1)], scan_size=len(beams), **values)[-1]
 
 
 def test_stamps_are_negative_while_still_and_positive_while_moving():
-    assembler = assembler_with(scan_size=2)
-    assembler.add(placed(seconds=1, moving=False))
-    assert assembler.add(placed(seconds=2, moving=True)).time_stamps.tolist() == [-1, -1, -1, 2, 2, 2]
+    assert _scan_of({"moving": False}, {"moving": True}).time_stamps.tolist() == [-1, -1, -1, 2, 2, 2]
 
 
 def test_every_beam_is_placed_by_its_own_transform():
-    assembler = assembler_with(scan_size=2)
-    assembler.add(placed(shift=(1.0, 0.0, 0.0)))
-    scan = assembler.add(placed(shift=(0.0, 5.0, -2.0)))
+    scan = _scan_of({"shift": (1.0, 0.0, 0.0)}, {"shift": (0.0, 5.0, -2.0)})
     np.testing.assert_allclose(
         scan.points[:, :3], [(1.5, 0, 0), (2.5, 0, 0), (3.5, 0, 0), (0.5, 5, -2), (1.5, 5, -2), (2.5, 5, -2)]
     )
 
 
 def test_a_scan_has_the_stamp_of_its_newest_beam_and_the_target_frame():
-    assembler = assembler_with(scan_size=2, target_frame="map")
-    assembler.add(placed(seconds=7))
-    scan = assembler.add(placed(seconds=8))
-    assert (scan.stamp_ns, scan.frame_id) == (8 * SECOND, "map")
+    scan = _scan_of({}, {}, target_frame="map")
+    assert (scan.stamp_ns, scan.frame_id) == (2 * SECOND, "map")
 
 
 def test_beams_of_different_bin_counts_make_one_scan():
-    assembler = assembler_with(scan_size=2)
-    assembler.add(placed(strengths=(1, 2), seconds=1))
-    scan = assembler.add(placed(strengths=(3, 4, 5, 6), seconds=2))
+    scan = _scan_of({"strengths": (1, 2)}, {"strengths": (3, 4, 5, 6)})
     assert scan.points[:, 3].tolist() == [1, 2, 3, 4, 5, 6]
     assert scan.time_stamps.tolist() == [-1, -1, -2, -2, -2, -2]
 
 
 def test_points_above_the_height_limit_go_with_their_stamps():
-    assembler = assembler_with(scan_size=2, height_limit=-1.0)
-    assembler.add(placed(seconds=1, shift=(0, 0, -0.5)))
-    assert assembler.add(placed(seconds=2, shift=(0, 0, -1.0))).time_stamps.tolist() == [-2, -2, -2]
+    scan = _scan_of({"shift": (0, 0, -0.5)}, {"shift": (0, 0, -1.0)}, height_limit=-1.0)
+    assert scan.time_stamps.tolist() == [-2, -2, -2]
 
 
 def test_a_scan_of_removed_points_only_is_an_empty_cloud():
-    scan = assembler_with(scan_size=1, min_range=50.0).add(placed())
+    scan = _scan_of({}, min_range=50.0)
     assert len(scan) == len(scan.time_stamps) == 0
 
 
@@ -189,59 +182,40 @@ def test_a_scan_of_removed_points_only_is_an_empty_cloud():
     st.booleans(),
 )
 def test_every_point_has_the_stamp_of_its_own_beam(beams, sides, min_range, mode, organized):
-    assembler = assembler_with(
-        scan_size=len(beams), dispersed_points=sides, min_range=min_range, mode=mode, keep_organized=organized
-    )
-    for number, (bins, moving) in enumerate(beams, 1):
-        # The strength of every echo tells which beam it is of.
-        scan = assembler.add(placed(strengths=[number] * bins, seconds=number, moving=moving))
+    # The strength of every echo tells which beam it is of.
+    made = [{"strengths": [number] * bins, "moving": moving} for number, (bins, moving) in enumerate(beams, 1)]
+    scan = _scan_of(*made, dispersed_points=sides, min_range=min_range, mode=mode, keep_organized=organized)
     signs = np.array([1.0 if moving else -1.0 for _, moving in beams])
-    finite = scan.valid
-    numbers = scan.points[finite, 3].astype(int)
-    np.testing.assert_array_equal(scan.time_stamps[finite], numbers * signs[numbers - 1])
+    numbers = scan.points[scan.valid, 3].astype(int)
+    np.testing.assert_array_equal(scan.time_stamps[scan.valid], numbers * signs[numbers - 1])
 
 
 @pytest.mark.parametrize("sides", [2, 5])
 def test_dispersed_points_multiply_the_points_and_their_stamps(sides):
-    assembler = assembler_with(scan_size=2, dispersed_points=sides)
-    assembler.add(placed(seconds=1))
-    scan = assembler.add(placed(seconds=2))
+    scan = _scan_of({}, {}, dispersed_points=sides)
     assert scan.time_stamps.tolist() == [-1.0] * (3 * sides) + [-2.0] * (3 * sides)
     assert scan.points[:, 3].tolist() == [10, 20, 30] * (2 * sides)
 
 
 def test_min_range_holds_for_every_side_of_a_dispersed_beam():
-    scan = assembler_with(scan_size=1, dispersed_points=3, min_range=1.0).add(placed())
-    assert scan.points[:, 3].tolist() == [20, 30] * 3
+    assert _scan_of({}, dispersed_points=3, min_range=1.0).points[:, 3].tolist() == [20, 30] * 3
 
 
-def test_an_organised_scan_has_a_row_per_beam_and_nan_for_removed_points():
-    assembler = assembler_with(scan_size=2, keep_organized=True, min_range=1.0)
-    assembler.add(placed(seconds=1))
-    scan = assembler.add(placed(seconds=2))
-    assert (scan.height, len(scan)) == (2, 6)
-    assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False] * 2
-    assert scan.time_stamps.tolist() == [-1, -1, -1, -2, -2, -2]
-
-
-def test_an_organised_scan_of_one_beam_keeps_its_bins():
-    scan = assembler_with(scan_size=1, keep_organized=True, min_range=1.0).add(placed())
-    assert scan.is_organized
-    assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False]
+@pytest.mark.parametrize("beams", [1, 2])
+def test_an_organised_scan_has_a_row_per_beam_and_nan_for_removed_points(beams):
+    scan = _scan_of(*[{}] * beams, keep_organized=True, min_range=1.0)
+    assert (scan.is_organized, scan.height) == (True, beams)
+    assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False] * beams
+    assert scan.time_stamps.tolist() == [-1, -1, -1, -2, -2, -2][: 3 * beams]
 
 
 def test_an_organised_laser_scan_has_a_point_per_beam():
-    assembler = assembler_with(mode="LASER", scan_size=2, keep_organized=True)
-    assembler.add(placed(strengths=(0, 0, 0)))
-    scan = assembler.add(placed())
-    assert (scan.height, len(scan)) == (2, 2)
-    assert scan.valid.tolist() == [False, True]
+    scan = _scan_of({"strengths": (0, 0, 0)}, {}, mode="LASER", keep_organized=True)
+    assert (scan.height, scan.valid.tolist()) == (2, [False, True])
 
 
 def test_beams_of_different_bin_counts_cannot_be_organised():
-    assembler = assembler_with(scan_size=2, keep_organized=True)
-    assembler.add(placed(strengths=(1, 2)))
-    assert assembler.add(placed(strengths=(1, 2, 3))).height == 1
+    assert _scan_of({"strengths": (1, 2)}, {"strengths": (1, 2, 3)}, keep_organized=True).height == 1
 
 
 @pytest.mark.parametrize(
@@ -256,8 +230,7 @@ def test_beams_of_different_bin_counts_cannot_be_organised():
     ids=["the strongest", "of equal ones the nearest", "beyond min_range", "no echo", "on the axis of a wide beam"],
 )
 def test_laser_keeps_one_echo_of_every_beam(strengths, values, points):
-    scan = assembler_with(mode="LASER", scan_size=1, **values).add(placed(strengths=strengths))
-    assert scan.points.tolist() == points
+    assert _scan_of({"strengths": strengths}, mode="LASER", **values).points.tolist() == points
 
 
 def test_projecting_a_beam_shows_it_and_leaves_the_scan_alone():

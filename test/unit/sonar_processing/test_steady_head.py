@@ -18,8 +18,7 @@ TURNS = STEP * np.arange(600)
 
 def _beams(angles):
     """Return beams at `angles` (n,) [rad], ten in a second."""
-    made = [beam_of(angle=float(angle), seconds=number) for number, angle in enumerate(angles)]
-    return [replace(beam, stamp_ns=beam.stamp_ns // 10) for beam in made]
+    return [beam_of(angle=float(angle), seconds=number / 10) for number, angle in enumerate(angles)]
 
 
 def _trembling(degrees, angles=TURNS):
