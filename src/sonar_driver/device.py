@@ -1,4 +1,4 @@
-"""A head on its line, and the driver's loop, which reconnects when the port is lost, and counts for /diagnostics."""
+"""A head on its line, pinged in a loop that reconnects when the port is lost, and the counts for /diagnostics."""
 
 import contextlib
 import threading
@@ -90,8 +90,12 @@ Ping = TypeVar("Ping")
 class LineDevice(ABC, Generic[Command, Ping]):
     """Gets one ping after the other from a head; `stop` interrupts every wait within a twentieth of a second.
 
-    One thread uses it; `stats`, the counts up to the last ping, may be read from any.
+    One thread uses it; `stats`, the counts up to the last ping, may be read from any. `command`, what `run` pings with,
+    may be assigned from any and applies to the next ping. Every command carries all settings, so the scan continues as
+    configured after a reconnection or a reboot of the head.
     """
+
+    command: Command
 
     zero = LineStats()
     """What the counts start from."""
@@ -112,6 +116,51 @@ class LineDevice(ABC, Generic[Command, Ping]):
         self._opener = opener
         self.stats = self.zero
         self._port: Optional[Port] = None
+        self._back_off = connection.back_off_first
+        self._last_reply = elapsed()
+
+    def connect(self) -> None:
+        """Open the port for the first time; `run` waits for a port that does not exist yet.
+
+        Raises PortRefusedError, whose reason the user must correct.
+        """
+        with contextlib.suppress(PortUnavailableError):
+            self.open()
+
+    def run(self, on_ping: Callable[[Ping], None]) -> None:
+        """Ping until the stop event is set, then close the port.
+
+        `on_ping` is called in this thread, once per valid reply, in order; it must not raise.
+        """
+        try:
+            while not self.stop.is_set():
+                if self.stats.connected or self._reconnected():
+                    with contextlib.suppress(PortUnavailableError):
+                        self._heard(self.ping(self.command), on_ping)
+        finally:
+            self.close()
+
+    def _heard(self, ping: Optional[Ping], on_ping: Callable[[Ping], None]) -> None:
+        now = self.elapsed()
+        if ping is not None:
+            self._last_reply = now
+            self._back_off = self.connection.back_off_first
+            on_ping(ping)
+        elif now - self._last_reply > self.connection.reopen_after:
+            # An adapter can hang, or a network connection die, without the port ever reporting it.
+            self._last_reply = now
+            self.close()
+
+    def _reconnected(self) -> bool:
+        if self.stop.wait(self._back_off):
+            return False
+        self._back_off = min(2 * self._back_off, self.connection.back_off_longest)
+        try:
+            self.open()
+        except PortError:
+            return False
+        self._last_reply = self.elapsed()
+        return True
 
     def open(self) -> None:
         """Open the port and greet the head; raises a PortError and remembers its text."""
@@ -172,62 +221,3 @@ class LineDevice(ABC, Generic[Command, Ping]):
 
     def _take_leave(self, port: Port) -> None:
         """Leave the head in a state of rest."""
-
-
-class Scanner(Generic[Command, Ping]):
-    """Pings with the current command. `command` may be assigned from any thread and applies to the next ping.
-
-    Every command carries all settings, so the scan continues as configured after a reconnection or a reboot of
-    the head.
-    """
-
-    def __init__(self, device: LineDevice[Command, Ping], command: Command, on_ping: Callable[[Ping], None]) -> None:
-        """`on_ping` is called in the thread of `run`, once per valid reply, in order; it must not raise."""
-        self.command = command
-        self._device = device
-        self._on_ping = on_ping
-        self._back_off = device.connection.back_off_first
-        self._last_reply = self._device.elapsed()
-
-    def connect(self) -> None:
-        """Open the port for the first time; `run` waits for a port that does not exist yet.
-
-        Raises PortRefusedError, whose reason the user must correct.
-        """
-        with contextlib.suppress(PortUnavailableError):
-            self._device.open()
-
-    def run(self) -> None:
-        """Ping until the device's stop event is set, then close the port."""
-        try:
-            while not self._device.stop.is_set():
-                if self._device.stats.connected or self._reconnected():
-                    self._ping()
-        finally:
-            self._device.close()
-
-    def _ping(self) -> None:
-        try:
-            ping = self._device.ping(self.command)
-        except PortUnavailableError:
-            return
-        now = self._device.elapsed()
-        if ping is not None:
-            self._last_reply = now
-            self._back_off = self._device.connection.back_off_first
-            self._on_ping(ping)
-        elif now - self._last_reply > self._device.connection.reopen_after:
-            # An adapter can hang, or a network connection die, without the port ever reporting it.
-            self._last_reply = now
-            self._device.close()
-
-    def _reconnected(self) -> bool:
-        if self._device.stop.wait(self._back_off):
-            return False
-        self._back_off = min(2 * self._back_off, self._device.connection.back_off_longest)
-        try:
-            self._device.open()
-        except PortError:
-            return False
-        self._last_reply = self._device.elapsed()
-        return True

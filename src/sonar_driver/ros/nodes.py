@@ -17,7 +17,7 @@ from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
 from node_support.ros.transforms import JointAngle, TfBuffer
-from sonar_driver.device import DriverHealth, LineDevice, LineStats, Scanner
+from sonar_driver.device import DriverHealth, LineDevice, LineStats
 from sonar_driver.emulated_head import (
     EchoSource,
     EchoSourceKind,
@@ -53,7 +53,6 @@ class DriverNode:
         self._make_device = device
         self._message = message
         self._device: Optional[LineDevice] = None
-        self._scanner: Optional[Scanner] = None
         self._stop = threading.Event()
         self._last_stats = LineStats()
         self.health = DriverHealth(name, lambda line: rospy.logwarn("%s", line), self._stats)
@@ -62,7 +61,7 @@ class DriverNode:
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
         try:
-            self._scanner.connect()
+            self._device.connect()
         except PortError as error:
             raise StartError(str(error)) from error
         stats = self._stats()
@@ -80,15 +79,14 @@ class DriverNode:
 
     def _use_parameters(self, parameters: ParameterSet) -> None:
         command = parameters.command()
-        if self._scanner is None:
+        if self._device is None:
             self._device = self._make_device(parameters, self._stop, rospy.get_time)
-            self._scanner = Scanner(self._device, command, guarded(self.health, self._publish))
-        self._scanner.command = command
+        self._device.command = command
 
     def _scan(self) -> None:
-        run = guarded(self.health, self._scanner.run)
+        run, publish = guarded(self.health, self._device.run), guarded(self.health, self._publish)
         while not self._stop.is_set():
-            run()
+            run(publish)
             self._stop.wait(_PAUSE_AFTER_FAILURE)
 
     def _publish(self, ping: Any) -> None:

@@ -1,9 +1,8 @@
 """The rays of a beam (fan, fan with side lobes, cone), their ends, and exactly the nearest surface inside each beam."""
 
 import math
-from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import Optional, Sequence, Tuple
+from typing import Optional, Sequence, Tuple, Union
 
 import numpy as np
 
@@ -15,105 +14,67 @@ from sonar_simulator.world.world import DEFAULT_MATERIAL, Material
 _SIDES = 16
 
 
-class RayPattern(ABC):
-    """Rays inside a beam that is a convex pyramid; the beam's frame has x along its axis and z up.
-
-    rays: their number in one beam.
-    """
-
-    rays: int
-
-    @property
-    def rays_inside(self) -> int:
-        """Number of rays, from the first, that are between the planes."""
-        return self.rays
-
-    @abstractmethod
-    def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, rays, 3) unit vectors in the frame of the beam, drawn anew for each beam."""
-
-    @abstractmethod
-    def planes(self) -> np.ndarray:
-        """Return (k, 3) unit normals, inward, of the planes through the sonar that bound the beam."""
-
-    def shares(self) -> np.ndarray:
-        """Return (rays,) the share of the beam's solid angle that each ray represents."""
-        return np.full(self.rays, 1.0 / self.rays)
-
-
 @dataclass(frozen=True)
-class BeamPattern(RayPattern):
+class BeamPattern:
     """A fan: a pyramid of rows x columns rays, one in each stratum of equal angles (thesis 4.1.1, 6.4.3).
 
-    vertical_opening, horizontal_opening: full angles of the beam, rad, below pi.
+    vertical_opening, horizontal_opening: full angles of the beam, rad, below pi. side_rays: so many more rays over all
+    bearings at the fan's elevations; what only these side lobes hear is not part of the beam.
     """
 
     vertical_opening: float
     horizontal_opening: float
     rows: int
     columns: int
+    side_rays: int = 0
+
+    @property
+    def rays_inside(self) -> int:
+        """Number of rays, from the first, that are between the planes."""
+        return self.rows * self.columns
 
     @property
     def rays(self) -> int:
-        return self.rows * self.columns
+        return self.rays_inside + self.side_rays
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
-        """Return (beams, rays, 3) unit vectors in the frame of the beam.
+        """Return (beams, rays, 3) unit vectors in the frame of the beam, x along its axis and z up.
 
         Every beam gets its own jitter: rays at fixed elevations would draw the floor as concentric arcs.
         """
+        if not self.side_rays:
+            return self._fan(beams, rng)
+        jitter = rng.random((2, beams, self.side_rays))
+        bearing = 2.0 * math.pi * (np.arange(self.side_rays) + jitter[0]) / self.side_rays
+        elevation = (jitter[1] - 0.5) * self.vertical_opening
+        level = np.cos(elevation)
+        side = np.stack([level * np.cos(bearing), level * np.sin(bearing), np.sin(elevation)], axis=-1)
+        return np.concatenate([self._fan(beams, rng), side], axis=1)
+
+    def _fan(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         jitter = rng.random((2, beams, self.rows, self.columns))
         row = np.arange(self.rows)[:, np.newaxis]
         elevation = ((row + jitter[0]) / self.rows - 0.5) * self.vertical_opening
         bearing = ((np.arange(self.columns) + jitter[1]) / self.columns - 0.5) * self.horizontal_opening
         slopes = np.stack([np.ones_like(bearing), np.tan(bearing), np.tan(elevation)], axis=-1)
         slopes /= np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
-        return slopes.reshape(beams, self.rays, 3)
+        return slopes.reshape(beams, self.rays_inside, 3)
 
     def planes(self) -> np.ndarray:
-        """Return (4, 3) inward normals: right, left, lower and upper side."""
+        """Return (4, 3) unit normals, inward, of the beam's right, left, lower and upper side."""
         across, up = self.horizontal_opening / 2.0, self.vertical_opening / 2.0
         sides = [[math.sin(across), sign * math.cos(across), 0.0] for sign in (1.0, -1.0)]
         return np.array(sides + [[math.sin(up), 0.0, sign * math.cos(up)] for sign in (1.0, -1.0)])
 
-
-@dataclass(frozen=True)
-class FanWithSideLobes(RayPattern):
-    """The rays of `fan`, followed by `side_rays` more over all bearings at the fan's elevations.
-
-    Only the fan bounds the beam: what only side lobes hear is not part of it.
-    """
-
-    fan: BeamPattern
-    side_rays: int
-
-    @property
-    def rays(self) -> int:
-        return self.fan.rays + self.side_rays
-
-    @property
-    def rays_inside(self) -> int:
-        return self.fan.rays
-
-    def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
-        jitter = rng.random((2, beams, self.side_rays))
-        bearing = 2.0 * math.pi * (np.arange(self.side_rays) + jitter[0]) / max(1, self.side_rays)
-        elevation = (jitter[1] - 0.5) * self.fan.vertical_opening
-        level = np.cos(elevation)
-        side = np.stack([level * np.cos(bearing), level * np.sin(bearing), np.sin(elevation)], axis=-1)
-        return np.concatenate([self.fan.sample(beams, rng), side], axis=1)
-
     def shares(self) -> np.ndarray:
         """Return (rays,) the share of the fan's solid angle that each ray represents."""
-        turns = 2.0 * math.pi / self.fan.horizontal_opening
-        return np.concatenate([self.fan.shares(), np.full(self.side_rays, turns / max(1, self.side_rays))])
-
-    def planes(self) -> np.ndarray:
-        return self.fan.planes()
+        turns = 2.0 * math.pi / self.horizontal_opening if self.side_rays else 0.0
+        side = np.full(self.side_rays, turns / max(1, self.side_rays))
+        return np.concatenate([np.full(self.rays_inside, 1.0 / self.rays_inside), side])
 
 
 @dataclass(frozen=True)
-class ConePattern(RayPattern):
+class ConePattern:
     """Rays spread evenly over a cone of full angle `opening`, rad (thesis 6.4.1, 6.4.2).
 
     The cone is a pyramid with 16 sides, like a mesh of a cone; each flat side touches the round cone from outside.
@@ -121,6 +82,10 @@ class ConePattern(RayPattern):
 
     opening: float
     rays: int
+
+    @property
+    def rays_inside(self) -> int:
+        return self.rays
 
     def sample(self, beams: int, rng: np.random.Generator) -> np.ndarray:
         """Return (beams, rays, 3) unit vectors in the frame of the beam: a sunflower, rotated anew for each beam."""
@@ -137,6 +102,13 @@ class ConePattern(RayPattern):
         return np.column_stack(
             [np.full(_SIDES, math.sin(half)), -math.cos(half) * np.cos(turn), -math.cos(half) * np.sin(turn)]
         )
+
+    def shares(self) -> np.ndarray:
+        return np.full(self.rays, 1.0 / self.rays)
+
+
+RayPattern = Union[BeamPattern, ConePattern]
+"""Rays inside a beam that is a convex pyramid, whose planes all pass through the sonar."""
 
 
 def head_turns(angles: np.ndarray) -> np.ndarray:

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.ndimage import uniform_filter1d
 
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.echoes.beam_tracer import BeamPattern, Contacts, FanWithSideLobes, RayPattern
+from sonar_simulator.echoes.beam_tracer import BeamPattern, Contacts
 from sonar_simulator.echoes.ray_caster import Mirrors
 from sonar_simulator.world.world import Material
 
@@ -110,12 +110,11 @@ class Physical:
         self._background = self._water() + self._ringing()
         self._receiver_gain = _ratio(self._tvg() + parameters.gain_db - parameters.full_level_db)
 
-    def pattern(self, fan: BeamPattern) -> RayPattern:
+    def pattern(self, fan: BeamPattern) -> BeamPattern:
         """Return as many rays as `fan` has over the main lobe, which is wider than its openings at 3 dB."""
         openings = self.parameters.vertical_opening_deg, self.parameters.horizontal_opening_deg
-        lobe = BeamPattern(*(math.radians(opening * _CAST_WIDTH) for opening in openings), fan.rows, fan.columns)
         side_rays = self.parameters.side_rays if self.parameters.side_lobe_db > _NONE else 0
-        return FanWithSideLobes(lobe, side_rays) if side_rays else lobe
+        return BeamPattern(*(math.radians(one * _CAST_WIDTH) for one in openings), fan.rows, fan.columns, side_rays)
 
     def echoes(self, contacts: Contacts, rng: np.random.Generator) -> np.ndarray:
         """Return strengths (beams, bins) uint8."""

@@ -87,7 +87,10 @@ def legs(
     for bounce in range(mirrors.bounces + 1):
         on_way = np.flatnonzero((left > _FAINT) & (gone < max_range))
         distances, faces, surface = _met(caster, origins[on_way], directions[on_way], mirrors)
-        yield _leg(on_way, gone, np.where(surface, np.inf, distances), faces, directions.copy(), left.copy())
+        ranges, all_faces = np.full(len(gone), np.inf), np.full(len(gone), -1, dtype=np.int64)
+        ranges[on_way] = gone[on_way] + np.where(surface, np.inf, distances)
+        all_faces[on_way] = np.where(np.isfinite(ranges[on_way]), faces, -1)
+        yield Leg(ranges, all_faces, directions.copy(), left.copy())
         if bounce == mirrors.bounces:
             return
         normals = np.where(surface[:, np.newaxis], _UP, world.normals[faces])
@@ -96,16 +99,6 @@ def legs(
         share = np.where(surface, 1.0 - mirrors.surface_loss, kept[world.face_material[faces]])
         left[on_way] *= np.where(np.isfinite(distances), share**2, 0.0)
         gone[on_way] += reach
-
-
-def _leg(
-    on_way: np.ndarray, gone: np.ndarray, distances: np.ndarray, faces: np.ndarray, directions: np.ndarray,
-    left: np.ndarray,
-) -> Leg:  # fmt: skip
-    ranges, all_faces = np.full(len(gone), np.inf), np.full(len(gone), -1, dtype=np.int64)
-    ranges[on_way] = gone[on_way] + distances
-    all_faces[on_way] = np.where(np.isfinite(distances), faces, -1)
-    return Leg(ranges, all_faces, directions, left)
 
 
 def _met(

@@ -3,7 +3,7 @@
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, List, Mapping, NamedTuple, Sequence, Tuple, Type, Union
+from typing import Any, List, Mapping, NamedTuple, Sequence, Type, Union
 
 import numpy as np
 
@@ -140,42 +140,28 @@ class VehicleScript:
         """Time from the first move's start to the last one's end, s."""
         return float(self._ends[-1])
 
-    def state(self, time: float) -> VehicleState:
-        """Return the vehicle's state at `time` s, in any order of times."""
-        index = self._index(time)
-        position, velocity = self._motion(time, index)
-        return VehicleState(_pose(position), _twist(position, velocity), self._is_still(time, index))
-
     def pose(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_world_base at `time` [s]; x forward, y left, z up."""
-        return _pose(self._motion(time, self._index(time))[0])
+        return self.state(time).T_world_base
 
-    def _index(self, time: float) -> int:
-        return int(np.searchsorted(self._ends, time, side="right"))
-
-    def _is_still(self, time: float, index: int) -> bool:
-        return time < 0.0 or index == len(self._ends) or not self._displacements[index].any()
-
-    def _motion(self, time: float, index: int) -> Tuple[np.ndarray, np.ndarray]:
-        """Return position and velocity (4,) along the axes of the world; `index` is that of the entry at `time`."""
+    def state(self, time: float) -> VehicleState:
+        """Return the vehicle's state at `time` s, in any order of times."""
+        index = int(np.searchsorted(self._ends, time, side="right"))
         if time < 0.0 or index == len(self._ends):
-            return self._origins[0 if time < 0.0 else -1], np.zeros(4)
-        duration, displacement = self._durations[index], self._displacements[index]
-        u = (time - (self._ends[index] - duration)) / duration
-        travelled = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
-        slope = 30.0 * u**2 * (1.0 - u) ** 2 / duration
-        return self._origins[index] + travelled * displacement, slope * displacement
-
-
-def _pose(position: np.ndarray) -> np.ndarray:
-    x, y, z, yaw = position.tolist()
-    return pose_matrix((x, y, z), (0.0, 0.0, yaw))
-
-
-def _twist(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
-    cos_yaw, sin_yaw = math.cos(position[3]), math.sin(position[3])
-    x, y, z, turn = velocity.tolist()
-    return np.array([cos_yaw * x + sin_yaw * y, cos_yaw * y - sin_yaw * x, z, 0.0, 0.0, turn])
+            position, velocity, is_still = self._origins[0 if time < 0.0 else -1], np.zeros(4), True
+        else:
+            duration, displacement = self._durations[index], self._displacements[index]
+            u = (time - (self._ends[index] - duration)) / duration
+            travelled = u**3 * (10.0 - 15.0 * u + 6.0 * u**2)
+            slope = 30.0 * u**2 * (1.0 - u) ** 2 / duration
+            position, velocity = self._origins[index] + travelled * displacement, slope * displacement
+            is_still = not displacement.any()
+        x, y, z, yaw = position.tolist()
+        along_x, along_y, up, turn = velocity.tolist()
+        cos_yaw, sin_yaw = math.cos(yaw), math.sin(yaw)
+        surge, sway = cos_yaw * along_x + sin_yaw * along_y, cos_yaw * along_y - sin_yaw * along_x
+        twist = np.array([surge, sway, up, 0.0, 0.0, turn])
+        return VehicleState(pose_matrix((x, y, z), (0.0, 0.0, yaw)), twist, is_still)
 
 
 def _kind_of(values: Any) -> Type[Entry]:

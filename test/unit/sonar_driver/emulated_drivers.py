@@ -17,7 +17,7 @@ from node_support.parameters import ParameterSet
 from ping360_driver import emulated_ping360
 from ping360_driver.device import Ping360Device
 from ping360_driver.parameters import HeadSettings
-from sonar_driver.device import LineDevice, Scanner
+from sonar_driver.device import LineDevice
 from sonar_driver.emulated_head import Fault, FaultInjector, FaultRates
 from sonar_driver.head_server import HeadServer, PtyLine, UdpLine
 from sonar_driver.port import LineParameters, datagram_address, is_datagram_port
@@ -133,12 +133,12 @@ class Scanning:
     def __init__(self, sonar, connection, settings=None):
         self.pings = []
         self.device = sonar.device(connection, threading.Event())
-        self.scanner = Scanner(self.device, (settings or sonar.settings).command(), self._note)
+        self.device.command = (settings or sonar.settings).command()
         self._news = threading.Condition()
-        self._thread = threading.Thread(target=self.scanner.run, daemon=True)
+        self._thread = threading.Thread(target=self.device.run, args=(self._note,), daemon=True)
 
     def __enter__(self):
-        self.scanner.connect()
+        self.device.connect()
         self._thread.start()
         return self
 
@@ -245,7 +245,8 @@ class VirtualScan:
 
     def scan(self):
         """Ping as a scanner does, until the stop event is set."""
-        Scanner(self.device, self.settings.command(), self.pings.append).run()
+        self.device.command = self.settings.command()
+        self.device.run(self.pings.append)
 
     @property
     def stats(self):

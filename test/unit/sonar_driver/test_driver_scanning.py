@@ -18,7 +18,6 @@ from emulated_drivers import (
 from fault_experiment import run
 from virtual_line import VirtualStopAt, VirtualTime
 
-from sonar_driver.device import Scanner
 from sonar_driver.emulated_head import Fault, FaultInjector
 from sonar_driver.port import PortRefusedError
 
@@ -72,9 +71,9 @@ def test_a_stop_ends_the_scan(ends, gone):
         assert scan.stop()
 
 
-def test_a_second_scanner_on_the_port_does_not_start(tmp_path):
+def test_a_second_driver_on_the_port_does_not_start(tmp_path):
     with running(IMAGENEX_852, tmp_path / "sonar") as (scan, _):
-        second = Scanner(IMAGENEX_852.device(scan.device.connection), None, print)
+        second = IMAGENEX_852.device(scan.device.connection)
         with pytest.raises(PortRefusedError, match="in use by another program"):
             second.connect()
 

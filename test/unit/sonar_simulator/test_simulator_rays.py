@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.geometry import pose_matrix
-from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer, FanWithSideLobes
+from sonar_simulator.echoes.beam_tracer import BeamPattern, BeamTracer
 from sonar_simulator.echoes.ray_caster import Mirrors, RayCaster, legs
 from sonar_simulator.world.world import MATERIALS, Shape, World
 
@@ -124,7 +124,7 @@ def test_what_stands_above_the_water_is_not_heard_when_the_surface_is_a_mirror()
 
 def test_side_lobes_look_all_around_and_leave_the_nearest_surface_of_the_beam_alone():
     behind = RayCaster(World.from_shapes("w", [_wall(20.5), _wall(-3.5)]))
-    pattern = FanWithSideLobes(BeamPattern(0.4, 0.05, 5, 3), 40)
+    pattern = BeamPattern(0.4, 0.05, 5, 3, side_rays=40)
     contacts = BeamTracer(behind, pattern).contacts(np.eye(4)[np.newaxis], np.zeros(1), 50.0, np.random.default_rng(0))
     assert contacts.ranges[0, 0] == pytest.approx(20.0, abs=1e-3)
     assert contacts.ranges[0, 16:].min() < 4.0
