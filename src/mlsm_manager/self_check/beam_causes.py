@@ -1,6 +1,6 @@
 """Causes that beams of a head that turns show by themselves: a blind side, and settings that changed in mid-run."""
 
-from typing import Callable, List, Optional, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -10,7 +10,7 @@ from node_support.timing import stretches
 from sonar_processing.beams.beam import Beam
 
 _CERTAIN = 500.0  # nats: of what needs no comparison of scans to be seen
-_MOSTLY = 0.5  # share of the beams of some seconds that are alike; where the vehicle turns they shift by bins
+_MOSTLY = 0.5  # share of the beams that are like themselves at twice the range
 _SECTORS, _BLIND = 36, 15  # of the circle; so many beside each other, 150 degrees, hear nothing while the others do
 _HEARS, _DEAF = 0.3, 0.02  # shares of the beams of a sector that hear something
 _SIDE = 60.0  # s before and after a change that are compared: some turns of the head
@@ -30,9 +30,21 @@ def of_trembling(degrees: float, is_mended: bool) -> Cause:
 
 def beam_causes(beams: Sequence[Beam]) -> List[Cause]:
     """Return what the beams of a recording, in the order of their stamps, show, while their head turns."""
-    heard = [beam for beam in beams if beam.intensities.any()]
-    changed = (_changed(heard, measure, text) for text, measure in _MEASURES)
-    return [*head_causes(beams), *(cause for cause in changed if cause is not None)]
+    causes, heard = head_causes(beams), [beam for beam in beams if beam.intensities.any()]
+    times = np.array([beam.stamp_ns * 1e-9 for beam in heard])
+    stronger = _change(times, np.array([float(beam.intensities.max()) for beam in heard]))
+    if stronger is not None:
+        begin, ratio = stronger
+        text = f"the gain changed: echoes are {ratio:.1f} times as strong from then on"
+        causes.append(Cause(text, _CERTAIN / 10.0, begin, metres=1.0))
+    longer = _change(times, np.array([_length(beam) for beam in heard]))
+    if longer is not None:
+        # Echoes that are longer than they were may be as long as ever, in reported ranges longer than the true ones.
+        begin, ratio = longer
+        text = f"gain, pulse length or range setting changed: echoes are {ratio:.1f} times as long from then on"
+        fault = SonarFault(SonarKind.RANGES, begin, (-float(np.log(ratio)),))
+        causes.append(Cause(text, _CERTAIN / 10.0, begin, metres=1.0, fault=fault))
+    return causes
 
 
 def head_causes(beams: Sequence[Beam]) -> List[Cause]:
@@ -81,33 +93,18 @@ def _alike_at(strengths: np.ndarray) -> np.ndarray:
         return np.corrcoef(strengths[bins], nearer)[0, 1:]
 
 
-def _loudest(beam: Beam) -> float:
-    return float(beam.intensities.max())
-
-
 def _length(beam: Beam) -> float:
     """Return how many bins are strong, m."""
     strengths = beam.intensities
     return float(np.count_nonzero(strengths > strengths.max() / 2)) * beam.range_resolution
 
 
-_MEASURES: Tuple[Tuple[str, Callable[[Beam], float]], ...] = (
-    ("the gain changed: echoes are {ratio:.1f} times as strong from then on", _loudest),
-    ("gain, pulse length or range setting changed: echoes are {ratio:.1f} times as long from then on", _length),
-)
-"""What a change of it means, and what is measured of a beam."""
-
-
-def _changed(beams: Sequence[Beam], measure: Callable[[Beam], float], text: str) -> Optional[Cause]:
-    """Return when the median of what is measured of beams stepped, where both sides are steady.
-
-    Echoes that are longer than they were may be as long as ever, in reported ranges that are longer than the true ones.
-    """
-    times, values = np.array([(beam.stamp_ns * 1e-9, measure(beam)) for beam in beams]).reshape(-1, 2).T
+def _change(times: np.ndarray, values: np.ndarray) -> Optional[Tuple[float, float]]:
+    """Return when [s] the median of `values` (n,) stepped, where both sides are steady, and by which factor."""
     if len(times) < _FEWEST:
         return None
-    best = (1.0, np.nan, np.nan)
-    for moment in np.arange(times[0] + _SIDE, times[-1] - _SIDE, _SIDE / 12.0):
+    found, largest = None, _CHANGED
+    for moment in np.arange(times[0] + _SIDE, times[-1] - _SIDE, _SIDE / 12.0).tolist():
         edges = np.searchsorted(times, moment + _SIDE * _PARTS)
         parts = [values[first:last] for first, last in zip(edges[:-1], edges[1:])]
         if min(len(part) for part in parts) < _FEWEST:
@@ -116,10 +113,6 @@ def _changed(beams: Sequence[Beam], measure: Callable[[Beam], float], text: str)
         before, after = np.exp(np.log(medians).mean(axis=1))
         steady = (medians.max(axis=1) / medians.min(axis=1)).max() < _STEADY
         factor = max(before / after, after / before)
-        if steady and factor > max(best[0], _CHANGED):
-            best = (factor, moment, after / before)
-    if np.isnan(best[1]):
-        return None
-    begin = float(best[1])
-    fault = SonarFault(SonarKind.RANGES, begin, (-float(np.log(best[2])),)) if measure is _length else None
-    return Cause(text.format(ratio=best[2]), _CERTAIN / 10.0, begin, metres=1.0, fault=fault)
+        if steady and factor > largest:
+            found, largest = (moment, after / before), factor
+    return found

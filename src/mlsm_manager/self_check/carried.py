@@ -3,13 +3,13 @@
 Pairs of scans show it: those of a stretch lie on each other once each is moved by a velocity times its time.
 """
 
-from typing import Dict, List, NamedTuple, Tuple
+from typing import Dict, List, NamedTuple
 
 import numpy as np
 
 from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.self_check.causes import Cause
-from mlsm_manager.self_check.scan_pairs import Hypothesis, NearPairs, ScanPairs, evidence_of
+from mlsm_manager.self_check.scan_pairs import Hypothesis, ScanPairs, evidence_of
 from node_support.geometry import grid
 
 _SPEEDS = np.arange(-0.6, 0.61, 0.15)  # m/s, along x and y: currents that a small vehicle is used in
@@ -23,10 +23,11 @@ _MOST = 3  # stretches: pairs tell how long one is worse than a fit does
 
 
 class _Stretch(NamedTuple):
-    """first, last: scans. velocity: (2,) m/s in the frame of the pairs. nats: over a vehicle that was not carried."""
+    """first, last: scans. pairs: (p, 2) of these. velocity: (2,) m/s in their frame. nats: over one without."""
 
     first: int
     last: int
+    pairs: np.ndarray
     velocity: np.ndarray
     nats: float
 
@@ -36,10 +37,8 @@ def carried(pairs: ScanPairs, base: Hypothesis, farther: float = 0.0) -> List[Ca
 
     base: what is right besides. farther: times as far as usual that the scans lie apart at least.
     """
-    near = pairs.near(base)
-    likeliest = _likeliest(pairs, near, base, farther * float(np.median(near.distances)))
-    likely = [found for found in likeliest if found.nats > _LEAST]
-    return [_cause(pairs, near, found, base) for found in likely if _is_told(pairs, found, base)]
+    likely = [found for found in _likeliest(pairs, base, farther) if found.nats > _LEAST]
+    return [_cause(pairs, found, base) for found in likely if _is_told(pairs, found, base)]
 
 
 def _is_told(pairs: ScanPairs, found: _Stretch, base: Hypothesis) -> bool:
@@ -52,49 +51,35 @@ def _is_told(pairs: ScanPairs, found: _Stretch, base: Hypothesis) -> bool:
     return bool(share > _FACING)
 
 
-def _cause(pairs: ScanPairs, near: NearPairs, found: _Stretch, base: Hypothesis) -> Cause:
-    begin, end = near.middles[[found.first, found.last]]
-    velocity = pairs.in_odometry(_refined(pairs, near, found, base), begin, base)
-    fault = MotionFault(FaultKind.CARRIED, float(begin), tuple(velocity.tolist()), float(end))
-    way = float(np.hypot(*velocity) * (end - begin))
-    return Cause(fault.text, found.nats, fault.begin, metres=way, fault=fault)
-
-
-def _likeliest(pairs: ScanPairs, near: NearPairs, base: Hypothesis, apart: float) -> List[_Stretch]:
-    """Return the likeliest stretches, each of another number of scans, which lie `apart` [m] or more; their evidence is
-    less by the logarithm of how many were tried.
-    """
-    count, speeds = len(near.middles), grid(_SPEEDS)
-    speeds = speeds[np.hypot(*speeds.T) > _STANDS]
-    stretches = [(first, last) for first in range(count) for last in range(first + 2, min(count, first + _SCANS + 1))]
-    table, tried = pairs.carried(near.pairs, speeds, base), np.log(len(stretches) * len(speeds))
-    best: Dict[int, _Stretch] = {}
-    for first, last in stretches:
-        within = near.within(first, last)
-        if min(within.sum(), (~within).sum()) >= _FEWEST and near.distances[within].mean() > apart:
-            found = _judged((first, last), within, near, table, speeds)
-            best[last - first] = max(best.get(last - first, found), found, key=_nats)
-    ordered = sorted(best.values(), key=_nats, reverse=True)[:_MOST]
-    return [found._replace(nats=found.nats - tried) for found in ordered]
-
-
-def _judged(
-    one: Tuple[int, int], within: np.ndarray, near: NearPairs, table: np.ndarray, speeds: np.ndarray
-) -> _Stretch:  # fmt: skip
-    """Return the likeliest velocity of a stretch, `one` from scan to scan; table: distances by speed and pair."""
-    row = int(table[:, within].mean(axis=1).argmin())
-    nats = evidence_of(near.distances[within], table[row, within], one[1] - one[0], near.distances[~within])
-    return _Stretch(*one, speeds[row], nats)
-
-
-def _nats(stretch: _Stretch) -> float:
-    return stretch.nats
-
-
-def _refined(pairs: ScanPairs, near: NearPairs, found: _Stretch, base: Hypothesis) -> np.ndarray:
-    """Return the velocity (2,) [m/s] more exactly than it was looked for."""
-    velocity, chosen = found.velocity, near.pairs[near.within(found.first, found.last)]
+def _cause(pairs: ScanPairs, found: _Stretch, base: Hypothesis) -> Cause:
+    """Return the cause with the velocity more exactly than it was looked for."""
+    velocity = found.velocity
     for step in _FINER:
         tried = velocity + step * grid(np.arange(-2, 3))
-        velocity = tried[pairs.carried(chosen, tried, base).mean(axis=1).argmin()]
-    return velocity
+        velocity = tried[pairs.carried(found.pairs, tried, base).mean(axis=1).argmin()]
+    begin, end = pairs.middles[[found.first, found.last]].tolist()
+    velocity = pairs.in_odometry(velocity, begin, base)
+    fault = MotionFault(FaultKind.CARRIED, begin, tuple(velocity.tolist()), end)
+    way = float(np.hypot(*velocity) * (end - begin))
+    return Cause(fault.text, found.nats, begin, metres=way, fault=fault)
+
+
+def _likeliest(pairs: ScanPairs, base: Hypothesis, farther: float) -> List[_Stretch]:
+    """Return the likeliest stretches, each of another number of scans; their evidence is less by the logarithm of how
+    many were tried. farther: see `carried`.
+    """
+    numbers, distances = pairs.near(base)
+    count, speeds, apart = len(pairs.middles), grid(_SPEEDS), farther * float(np.median(distances))
+    speeds = speeds[np.hypot(*speeds.T) > _STANDS]
+    stretches = [(first, last) for first in range(count) for last in range(first + 2, min(count, first + _SCANS + 1))]
+    table, tried = pairs.carried(numbers, speeds, base), np.log(len(stretches) * len(speeds))
+    best: Dict[int, _Stretch] = {}
+    for first, last in stretches:
+        within, size = (numbers[:, 0] >= first) & (numbers[:, 1] <= last), last - first
+        if min(within.sum(), (~within).sum()) < _FEWEST or distances[within].mean() <= apart:
+            continue
+        row = int(table[:, within].mean(axis=1).argmin())
+        nats = evidence_of(distances[within], table[row, within], size, distances[~within]) - tried
+        if size not in best or nats > best[size].nats:
+            best[size] = _Stretch(first, last, numbers[within], speeds[row], nats)
+    return sorted(best.values(), key=lambda one: -one.nats)[:_MOST]

@@ -5,7 +5,7 @@ from typing import Any, Dict, Iterable, List, NamedTuple, Optional, Sequence, Un
 
 import numpy as np
 
-from mlsm_manager.joint_solver.sonar_trials import SonarFault
+from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
 from mlsm_manager.odometry.faults import TURNED, FaultKind, MotionFault
 from mlsm_manager.odometry.steps import Step, StepKind
 from mlsm_manager.self_check.verdict import moment
@@ -54,6 +54,11 @@ class Cause:
     metres: float = 0.0
     fault: Optional[Fault] = None
 
+    @property
+    def kind(self) -> Union[FaultKind, SonarKind, None]:
+        """That of the fault; None without one."""
+        return None if self.fault is None else self.fault.kind
+
     def to_mapping(self, run_begin: float) -> Dict[str, Any]:
         """Return it for summary.json; run_begin: s."""
         second = None if np.isnan(self.begin) else round(self.begin - run_begin, 1)
@@ -64,12 +69,6 @@ class Cause:
     def line(self, run_begin: float) -> str:
         """Return it for people; run_begin: s."""
         return self.text if np.isnan(self.begin) else f"{self.text} at {moment(max(self.begin, run_begin), run_begin)}"
-
-
-def is_alike(one: Cause, other: Cause) -> bool:
-    """Return whether two causes have faults of one kind, or both have none."""
-    kinds = [None if cause.fault is None else cause.fault.kind for cause in (one, other)]
-    return kinds[0] is kinds[1]
 
 
 class Assumption(NamedTuple):
@@ -100,8 +99,12 @@ def ranked(causes: Iterable[Cause]) -> List[Cause]:
 
 def of_steps(steps: Sequence[Step]) -> List[Cause]:
     """Return a cause for each of a few steps of a kind, and one for all of many; all were left out."""
-    kinds = ([step for step in steps if step.kind is kind] for kind in StepKind)
-    return [cause for of_kind in kinds for cause in _of_kind(of_kind)]
+    causes: List[Cause] = []
+    for kind in StepKind:
+        of_kind = [step for step in steps if step.kind is kind]
+        groups = [[step] for step in of_kind] if len(of_kind) <= _FEW else [of_kind]
+        causes += map(_of_step, groups)
+    return causes
 
 
 def unsure_length(size: float) -> float:
@@ -113,11 +116,6 @@ def of_stuck(begin: float, end: float) -> Cause:
     """Return the cause for a heading that stood from `begin` to `end` [s] while the vehicle went on."""
     fault = MotionFault(FaultKind.STUCK, begin, (0.0,), end)
     return Cause(f"the compass stuck for {end - begin:.0f} s", CERTAIN, begin, turn=np.pi / 2.0, fault=fault)
-
-
-def _of_kind(steps: List[Step]) -> List[Cause]:
-    groups = [[step] for step in steps] if len(steps) <= _FEW else [steps]
-    return [_of_step(group) for group in groups]
 
 
 def _of_step(steps: List[Step]) -> Cause:

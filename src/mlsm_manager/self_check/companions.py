@@ -4,7 +4,7 @@ from dataclasses import replace
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
-from scipy.ndimage import binary_propagation
+from scipy.ndimage import binary_dilation, binary_propagation
 
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import CERTAIN, Cause
@@ -42,8 +42,9 @@ def without_companions(beams: Sequence[PlacedBeam], track: Track) -> Tuple[List[
     towards = [one for one, points in zip(beams, pointing) if points]
     if _may_be_wall(goes_along) and not _is_heard_everywhere(track, towards, heard):
         return list(beams), []
-    near = _in_range(goes_along | _in_next_sectors(goes_along))
-    near = binary_propagation(near, _ALONG_BEAMS, near | _in_range(_mostly(loud, looked).any(axis=0)))
+    near = binary_dilation(goes_along | _in_next_sectors(goes_along), _ALONG_BEAMS)
+    often = _mostly(loud, looked).any(axis=0)
+    near = binary_propagation(near, _ALONG_BEAMS, near | binary_dilation(often, _ALONG_BEAMS))
     metres, width = _CELL * (0.5 + np.nonzero(goes_along)[1].min()), goes_along.any(axis=1).sum() * 360 // _SECTORS
     text = f"something {metres:.1f} m away goes along with the vehicle, in {width} deg of the circle"
     left = [_without(one, near[sector]) for one, sector in zip(beams, sectors)]
@@ -91,8 +92,9 @@ def _heard_always(loud: np.ndarray, looked: np.ndarray, sectors: np.ndarray) -> 
     entered = np.bincount(sectors[np.diff(sectors, prepend=-1) != 0], minlength=_SECTORS) >= _FEWEST
     always = _mostly(loud, looked) & entered[:, np.newaxis]
     widest = _WIDEST * np.count_nonzero(entered)
-    always[:, (always.sum(axis=0) > widest) | (_share(loud, looked, ~always) > _ELSEWHERE)] = False
-    always &= _in_range(_in_next_sectors(always))
+    elsewhere = (loud * ~always).sum(axis=0) / np.maximum(looked @ ~always, 1)
+    always[:, (always.sum(axis=0) > widest) | (elsewhere > _ELSEWHERE)] = False
+    always &= binary_dilation(_in_next_sectors(always), _ALONG_BEAMS)
     return always if _NARROWEST <= always.any(axis=1).sum() <= widest else None
 
 
@@ -101,22 +103,9 @@ def _mostly(loud: np.ndarray, looked: np.ndarray) -> np.ndarray:
     return loud > _MOSTLY * looked[..., np.newaxis]
 
 
-def _share(loud: np.ndarray, looked: np.ndarray, chosen: np.ndarray) -> np.ndarray:
-    """Return which share (cells,) of the beams that look (sectors,) is loud in the `chosen` of (sectors, cells)."""
-    return (loud * chosen).sum(axis=0) / np.maximum(looked @ chosen, 1)
-
-
 def _in_next_sectors(cells: np.ndarray) -> np.ndarray:
     """Return which cells (sectors, cells) lie beside some of `cells`, as far away."""
     return np.roll(cells, 1, axis=0) | np.roll(cells, -1, axis=0)
-
-
-def _in_range(cells: np.ndarray) -> np.ndarray:
-    """Return `cells` (sectors, cells) and those just nearer and just farther."""
-    wide = cells.copy()
-    wide[:, 1:] |= cells[:, :-1]
-    wide[:, :-1] |= cells[:, 1:]
-    return wide
 
 
 def _loud(placed: PlacedBeam) -> np.ndarray:

@@ -1,6 +1,7 @@
 """When the beams were sent, by the odometry's clock: all later than their stamps, or from a moment on, or ever more."""
 
-from typing import List, NamedTuple
+from itertools import product
+from typing import List, Tuple
 
 import numpy as np
 
@@ -21,9 +22,7 @@ def late(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     """Return that all beams are later than their stamps, or earlier, where that is likelier than `honest`."""
     found = pairs.best(LATE)
     nats = pairs.evidence(found, honest) - np.log(len(LATE))
-    if abs(found.delay) <= _LATE_TOLD or nats < NAMED_FROM:
-        return []
-    return [late_cause(found.delay, nats)]
+    return [late_cause(found.delay, nats)] if abs(found.delay) > _LATE_TOLD and nats >= NAMED_FROM else []
 
 
 def late_cause(delay: float, nats: float) -> Cause:
@@ -33,11 +32,8 @@ def late_cause(delay: float, nats: float) -> Cause:
     return Cause(text, nats, metres=LATE_BY)
 
 
-class _Delays(NamedTuple):
-    """rows: (p,) int, of the delay at each pair, in _DELAYS. fault: with which the delay is so."""
-
-    rows: np.ndarray
-    fault: MotionFault
+_Delays = Tuple[np.ndarray, MotionFault]
+"""The number of the delay at each pair (p,), in _DELAYS, and the fault with which it is so."""
 
 
 def suspected_delays(pairs: ScanPairs, base: Hypothesis) -> List[MotionFault]:
@@ -49,9 +45,9 @@ def suspected_delays(pairs: ScanPairs, base: Hypothesis) -> List[MotionFault]:
     even, numbers = table[table.mean(axis=1).argmin()], np.arange(len(times))
     found = []
     for kind in filter(None, (_changes(table, times), _growths(times))):
-        apart, best = min(((table[one.rows, numbers], one) for one in kind), key=lambda tried: tried[0].mean())
+        apart, fault = min(((table[rows, numbers], fault) for rows, fault in kind), key=lambda tried: tried[0].mean())
         if evidence_of(even, apart, pairs.scans) > NAMED_FROM:
-            found.append(best.fault)
+            found.append(fault)
     return found
 
 
@@ -61,20 +57,20 @@ def _changes(table: np.ndarray, times: np.ndarray) -> List[_Delays]:
     table: (k, p) m, how far pairs at `times` (p,) [s] lie apart with each delay.
     """
     found = []
-    for begin in np.unique(times)[_FEWEST:-_FEWEST]:
+    for begin in np.unique(times)[_FEWEST:-_FEWEST].tolist():
         before = times < begin
         first, last = (int(table[:, which].mean(axis=1).argmin()) for which in (before, ~before))
-        fault = MotionFault(FaultKind.LATER, float(begin), (float(_DELAYS[last] - _DELAYS[first]),))
-        found.append(_Delays(np.where(before, first, last), fault))
+        fault = MotionFault(FaultKind.LATER, begin, (float(_DELAYS[last] - _DELAYS[first]),))
+        found.append((np.where(before, first, last), fault))
     return found
 
 
 def _growths(times: np.ndarray) -> List[_Delays]:
     """Return delays that grow evenly, from any one to any other."""
-    found, since = [], (times - times[0]) / max(np.ptp(times), 1.0)
-    for first in range(len(_DELAYS)):
-        for last in range(len(_DELAYS)):
-            rows = np.round(first + since * (last - first)).astype(int)
-            rate = float(_DELAYS[last] - _DELAYS[first]) / max(float(np.ptp(times)), 1.0)
-            found.append(_Delays(rows, MotionFault(FaultKind.EVER_LATER, float(times[0]), (rate,))))
+    found, seconds = [], max(float(np.ptp(times)), 1.0)
+    since = (times - times[0]) / seconds
+    for first, last in product(range(len(_DELAYS)), repeat=2):
+        rows = np.round(first + since * (last - first)).astype(int)
+        rate = float(_DELAYS[last] - _DELAYS[first]) / seconds
+        found.append((rows, MotionFault(FaultKind.EVER_LATER, float(times[0]), (rate,))))
     return found

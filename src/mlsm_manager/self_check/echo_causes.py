@@ -90,16 +90,17 @@ def echo_findings(
     suspected = [cause.fault for cause in (currents[1:] if named else carried(pairs, AS_TOLD))]
     found = [*late(pairs, honest), *_shifted(pairs, honest), *_changed(pairs), *named]
     aside = pairs.best(around(AS_TOLD, "turn", _ASIDE))
-    suspected += [*_suspected_slips(pairs, slipping, aside), *suspected_delays(pairs, aside)]
-    return EchoFindings(ranked(found), AS_TOLD, suspected)
+    if slipping.slips and pairs.evidence(slipping, aside) >= NAMED_FROM:
+        suspected.append(MotionFault(FaultKind.SLIPS_ON, float(pairs.times[0, 0]), (slipping.slips,)))
+    return EchoFindings(ranked(found), AS_TOLD, [*suspected, *suspected_delays(pairs, aside)])
 
 
 def _is_chance(pairs: ScanPairs, right: Hypothesis) -> bool:
     """Return whether scans lie no better on each other than turned ones do, even if `right` is."""
-    near = pairs.near(right)
-    chosen = np.unique(np.linspace(0, len(near.pairs) - 1, _COMPARED).astype(int))
-    turned = pairs.changed(near.pairs[chosen], _TURNED_APART, right).mean(axis=1)
-    return bool(near.distances[chosen].mean() > _NO_BETTER * np.median(turned))
+    numbers, distances = pairs.near(right)
+    chosen = np.unique(np.linspace(0, len(numbers) - 1, _COMPARED).astype(int))
+    turned = pairs.changed(numbers[chosen], _TURNED_APART, right).mean(axis=1)
+    return bool(distances[chosen].mean() > _NO_BETTER * np.median(turned))
 
 
 def _astray(cause: Cause, pairs: ScanPairs) -> Cause:
@@ -148,35 +149,24 @@ def turn_text(found: Hypothesis) -> str:
     return side if abs(turn) < np.degrees(_TURN_TOLD) else f"{side}; it is {angle} besides"
 
 
-class PutRight(NamedTuple):
-    """track: T_odom_base without what was wrong with it: `cause`. assumed: what that rests on."""
-
-    track: Track
-    cause: Cause
-    assumed: Assumption
-
-
-def put_right(track: Track, found: Hypothesis) -> PutRight:
-    """Return an odometry whose positions were mirrored or whose moves were turned, or whose headings were reversed.
+def put_right(track: Track, found: Hypothesis) -> Tuple[Track, Cause, Assumption]:
+    """Return T_odom_base without mirrored positions, turned moves or reversed headings, the cause and what it rests on.
 
     Where headings were, the sonar or the compass may be turned besides; that is left as it is.
     """
+    text, assumed = turn_text(found), Assumption(_AS_TOLD, 0.0)
     if found.is_over:
-        return _certainly(with_headings_reversed(track, found.mirrored is Mirror.MOVES), found)
-    right = with_positions_turned(found.mirrored.of(track), -found.turn)
-    if found.mirrored is not Mirror.NOTHING:
-        return _certainly(right, found)
-    angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg"
-    text = f"the odometry's direction of motion is turned by {angle} against the vehicle"
-    if abs(abs(found.turn) - np.pi / 2.0) < _SWAPPED:
-        text += ", or its x and y are swapped"
-    cause = Cause(f"{text}, or the compass is off", CERTAIN, is_mended=True, turn=TURN_DEVIATION)
-    return PutRight(right, cause, Assumption(f"{_AS_TOLD}, and the compass is right", abs(found.turn)))
-
-
-def _certainly(track: Track, found: Hypothesis) -> PutRight:
-    cause = Cause(turn_text(found), CERTAIN, is_mended=True, turn=TURN_DEVIATION)
-    return PutRight(track, cause, Assumption(_AS_TOLD, 0.0))
+        right = with_headings_reversed(track, found.mirrored is Mirror.MOVES)
+    else:
+        right = with_positions_turned(found.mirrored.of(track), -found.turn)
+    if not found.is_over and found.mirrored is Mirror.NOTHING:
+        angle = f"{np.degrees(found.turn):.0f} +- {np.degrees(TURN_DEVIATION):.0f} deg"
+        text = f"the odometry's direction of motion is turned by {angle} against the vehicle"
+        if abs(abs(found.turn) - np.pi / 2.0) < _SWAPPED:
+            text += ", or its x and y are swapped"
+        text += ", or the compass is off"
+        assumed = Assumption(f"{_AS_TOLD}, and the compass is right", abs(found.turn))
+    return right, Cause(text, CERTAIN, is_mended=True, turn=TURN_DEVIATION), assumed
 
 
 def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
@@ -190,22 +180,10 @@ def _shifted(pairs: ScanPairs, honest: Hypothesis) -> List[Cause]:
     return [Cause(fault.text, nats, metres=size, fault=fault)]
 
 
-class _Changed(NamedTuple):
-    """change: the likeliest of those that were tried from the scan of `begin` [s] on. nats: over that there is none."""
-
-    change: Change
-    begin: float
-    nats: float
-
-
 def _changed(pairs: ScanPairs) -> List[Cause]:
     """Return whether scans lie turned, or larger or smaller, on those before a moment, and not on those after it."""
-    found = [
-        _of_change(one.change, one.begin, one.nats, pairs.typical_range())
-        for one in _likely_changes(pairs, [*_SLIPS, *_RANGES], AS_TOLD)
-        if one.nats > NAMED_FROM and (one.change.ranges != 1.0 or abs(one.change.turn) > _SLIP_TOLD)
-    ]
-    return ranked(found)[:1]
+    likely = [one for one in _likely_changes(pairs, [*_SLIPS, *_RANGES], AS_TOLD) if one.evidence > NAMED_FROM]
+    return ranked(one for one in likely if one.kind is SonarKind.RANGES or one.turn > _SLIP_TOLD)[:1]
 
 
 def _suspected_changes(pairs: ScanPairs) -> List[Fault]:
@@ -213,11 +191,10 @@ def _suspected_changes(pairs: ScanPairs) -> List[Fault]:
 
     Scans are compared along the solver's path, which such a change may have bent.
     """
-    slips = [one for one in _likely_changes(pairs, _SLIPS, pairs.honest) if one.change.turn]
+    slips = [one for one in _likely_changes(pairs, _SLIPS, pairs.honest) if one.turn]
     ranges = _likely_changes(pairs, _RANGES, pairs.honest)
-    farther, nearer = ([one for one in ranges if (one.change.ranges > 1.0) is more] for more in (True, False))
-    kinds = (sorted(kind, key=lambda one: -one.nats)[:1] for kind in (slips, farther, nearer))
-    return [_fault_of(one.change, one.begin) for kind in kinds for one in kind]
+    farther, nearer = ([one for one in ranges if (one.fault.sizes[0] > 0.0) is more] for more in (True, False))
+    return [cause.fault for kind in (slips, farther, nearer) for cause in ranked(kind)[:1]]
 
 
 def _slipping(pairs: ScanPairs) -> Hypothesis:
@@ -230,38 +207,25 @@ def _slipping(pairs: ScanPairs) -> Hypothesis:
     return pairs.best(around(found, "slips", found.slips + _FINE_RATES))
 
 
-def _suspected_slips(pairs: ScanPairs, slipping: Hypothesis, right: Hypothesis) -> List[Fault]:
-    """Return that the head slips all the time, where pairs of scans lie closer to each other if it does than if not."""
-    if not slipping.slips or pairs.evidence(slipping, right) < NAMED_FROM:
-        return []
-    return [MotionFault(FaultKind.SLIPS_ON, float(pairs.times[0, 0]), (slipping.slips,))]
-
-
-def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis) -> List[_Changed]:
+def _likely_changes(pairs: ScanPairs, changes: Sequence[Change], base: Hypothesis) -> List[Cause]:
     """Return the likeliest of `changes` from each scan on from which scans lie farther from those before."""
-    near, found = pairs.near(pairs.honest), []
-    for number, begin in enumerate(near.begins):
-        across, before = (near.pairs[:, 0] < number) & (near.pairs[:, 1] >= number), near.pairs[:, 1] < number
+    numbers, distances = pairs.near(pairs.honest)
+    usual, found = pairs.typical_range(), []
+    for number, begin in enumerate(pairs.begins.tolist()):
+        across, before = (numbers[:, 0] < number) & (numbers[:, 1] >= number), numbers[:, 1] < number
         if across.sum() < _FEWEST_SLIPPED or before.sum() < _FEWEST_BEFORE:
             continue
-        apart, alike = near.distances[across], near.distances[before]
+        apart, alike = distances[across], distances[before]
         if apart.mean() < _FARTHER * alike.mean():
             continue
-        table = pairs.changed(near.pairs[across], changes, base)
+        table = pairs.changed(numbers[across], changes, base)
         row = int(table.mean(axis=1).argmin())
-        nats = evidence_of(apart, table[row], len(np.unique(near.pairs[across, 1])), alike)
-        nats -= np.log(len(near.begins) * len(changes))
-        found.append(_Changed(changes[row], float(begin), nats))
+        nats = evidence_of(apart, table[row], len(np.unique(numbers[across, 1])), alike)
+        nats -= np.log(len(pairs.begins) * len(changes))
+        turn, ranges = changes[row]
+        fault = MotionFault(FaultKind.SLIP, begin, (turn,))
+        if ranges != 1.0:
+            fault = SonarFault(SonarKind.RANGES, begin, (float(np.log(ranges)),))
+        metres = abs(1.0 - ranges) * usual
+        found.append(Cause(fault.text, nats, begin, turn=abs(turn), metres=metres, fault=fault))
     return found
-
-
-def _of_change(change: Change, begin: float, nats: float, usual: float) -> Cause:
-    """Return the cause for a change of the head or of its setting; usual: m, range of echoes."""
-    fault, metres = _fault_of(change, begin), abs(1.0 - change.ranges) * usual
-    return Cause(fault.text, nats, begin, turn=abs(change.turn), metres=metres, fault=fault)
-
-
-def _fault_of(change: Change, begin: float) -> Fault:
-    if change.ranges == 1.0:
-        return MotionFault(FaultKind.SLIP, begin, (change.turn,))
-    return SonarFault(SonarKind.RANGES, begin, (float(np.log(change.ranges)),))

@@ -1,6 +1,7 @@
 """Takes faults of odometry and sonar out of a whole run, one after the other, and names those without which it fits."""
 
 from dataclasses import replace
+from operator import attrgetter
 from typing import List, NamedTuple, Sequence, Tuple
 
 import numpy as np
@@ -80,6 +81,9 @@ class _Trial(NamedTuple):
         return self.run.with_state(self.fit.state)
 
 
+_GAIN = attrgetter("gain")
+
+
 def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Suspicion) -> MotionFindings:
     """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
 
@@ -90,10 +94,9 @@ def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Sus
     found, are_few = MotionFindings(run, fit, track), len(fit.node_times) < _FEWEST
     if run.parameters.node_search is not None or not found.is_told or (are_few and not suspected):
         return found
-    first = places = found.places
+    first = places = found.run.places
     rivals: List[np.ndarray] = []
-    worth_it = [fault for fault in _with_longest_stuck(suspected) if not _is_missed_turn(fault, suspected)]
-    suspected = [one for fault in worth_it for one in _possible(fault)]
+    suspected = _possible(suspected)
     for _ in range(_FAULTS + 1):
         errors = freed_errors(found.run)
         if errors is None:
@@ -109,7 +112,7 @@ def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Sus
         found, rivals = _without(found, best), [*rivals, *rival]
         suspected = [fault for fault in suspected if not is_same(fault, best.fault)]
     others = [places, first, *rivals] if found.causes else [places] if _errs(errors) and not are_few else []
-    return replace(found, apart=[other - found.places for other in others])
+    return replace(found, apart=[other - found.run.places for other in others])
 
 
 def _needed(found: MotionFindings, fault: Fault) -> float:
@@ -167,9 +170,9 @@ def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[
     """Return the trial that makes the run likeliest, and where it went by another turn that is nearly as likely."""
     trials = [_tried(found, fault) for fault in faults]
     worth_it = [trial for trial in trials if trial.gain > 0.0 or not isinstance(trial.fault, SonarFault)]
-    best = max(worth_it or trials, key=_gain)
+    best = max(worth_it or trials, key=_GAIN)
     for _ in range(_rounds(found, best)):
-        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_gain)
+        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_GAIN)
     return best, _rival(best, trials) if best.fault.kind is FaultKind.STUCK else []
 
 
@@ -192,23 +195,20 @@ def _rival(best: _Trial, trials: Sequence[_Trial]) -> List[np.ndarray]:
     return [max(places, key=lambda one: float(np.hypot(*(one - best.fitted.places).T).mean()))] if places else []
 
 
-def _with_longest_stuck(suspected: Sequence[Fault]) -> List[Fault]:
-    """Return suspected faults, of a compass that often stuck only so many as are taken out: each takes 24 trials."""
+def _possible(suspected: Sequence[Fault]) -> List[Fault]:
+    """Return what suspected faults may be.
+
+    Nobody tells how far a vehicle turned while its compass stuck, and each time takes 24 trials: the longest ones only
+    are tried. A slip that is suspected of the head meanwhile is that turn.
+    """
     stuck = sorted((one for one in suspected if one.kind is FaultKind.STUCK), key=lambda one: one.begin - one.end)
-    return [*(one for one in suspected if one.kind is not FaultKind.STUCK), *stuck[:_FAULTS]]
 
+    def is_missed_turn(fault: Fault) -> bool:
+        return fault.kind is FaultKind.SLIP and any(one.begin <= fault.begin <= one.end for one in stuck)
 
-def _possible(fault: Fault) -> List[Fault]:
-    """Return what a suspected fault may be: nobody tells how far a vehicle turned while its compass stuck."""
-    if fault.kind is not FaultKind.STUCK:
-        return [fault]
-    return [replace(fault, sizes=(turn,)) for turn in (_TURNED * np.arange(-12, 12)).tolist()]
-
-
-def _is_missed_turn(fault: Fault, suspected: Sequence[Fault]) -> bool:
-    """Return whether a slip is suspected of the head while the compass stuck: the vehicle turned."""
-    stuck = [one for one in suspected if one.kind is FaultKind.STUCK]
-    return fault.kind is FaultKind.SLIP and any(one.begin <= fault.begin <= one.end for one in stuck)
+    others = [one for one in suspected if one.kind is not FaultKind.STUCK and not is_missed_turn(one)]
+    turns = (_TURNED * np.arange(-12, 12)).tolist()
+    return [*others, *(replace(one, sizes=(turn,)) for one in stuck[:_FAULTS] for turn in turns)]
 
 
 def _beside(fault: Fault) -> List[Fault]:
@@ -227,7 +227,11 @@ def _beside(fault: Fault) -> List[Fault]:
 def _tried(found: MotionFindings, fault: Fault) -> _Trial:
     if isinstance(fault, SonarFault):
         run, fit = fit_without(found.run, fault)
-        return _Trial(fault, run, fit, found.track, _gained(found, fault, run, fit))
+        gain = fit.log_likelihood - found.fit.log_likelihood
+        if not np.isnan(fault.begin):
+            unchanged = replace(fault, sizes=(0.0,))
+            gain = likelihood_across(run, fit.state, fault) - likelihood_across(found.run, found.fit.state, unchanged)
+        return _Trial(fault, run, fit, found.track, gain)
     track = fault.mended(found.track)
     run = with_odometry(found.run, track)
     if fault.kind is FaultKind.STUCK:  # how the vehicle turned meanwhile the echoes tell
@@ -261,17 +265,6 @@ def _of_more(found: MotionFindings, run: Solution, fit: QuickFit, begin: float) 
     before, _ = compared_since(replace(found.run, state=found.fit.state), begin)
     compared, likelihood = compared_since(replace(run, state=fit.state), begin)
     return max(compared - _MORE * before, 0.0) * likelihood / max(compared, 1.0)
-
-
-def _gained(found: MotionFindings, fault: SonarFault, run: Solution, fit: QuickFit) -> float:
-    if np.isnan(fault.begin):
-        return fit.log_likelihood - found.fit.log_likelihood
-    unchanged = replace(fault, sizes=(0.0,))
-    return likelihood_across(run, fit.state, fault) - likelihood_across(found.run, found.fit.state, unchanged)
-
-
-def _gain(trial: _Trial) -> float:
-    return trial.gain
 
 
 def _without(found: MotionFindings, trial: _Trial) -> MotionFindings:

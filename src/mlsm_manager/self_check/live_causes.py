@@ -9,7 +9,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.odometry.faults import FaultKind, MotionFault
+from mlsm_manager.odometry.faults import FaultKind
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
@@ -21,7 +21,6 @@ from mlsm_manager.self_check.causes import (
     Cause,
     Fault,
     Suspicion,
-    is_alike,
     of_steps,
     of_stuck,
     ranked,
@@ -95,14 +94,15 @@ class LiveCauses:
             self._places: Deque[Tuple[float, float, float]] = deque(maxlen=_MOST_PLACES)
             self._corrections: Deque[np.ndarray] = deque(maxlen=_NEWEST)
             self._beams: Deque[Beam] = deque(maxlen=_MOST_BEAMS)
-            self._usual_difference = 0.0
-            self._is_new = False
-            self._found: List[Cause] = []
-            self._shown: List[Cause] = []
+            self._usual_difference, self._is_new = 0.0, False
+            self._named: List[Cause] = []
+            self._last = _Found([], NOT_TOLD, NOTHING_ASSUMED)
             self._spread, self.by_mounts = np.zeros((2, 2)), 0.0
-            self._course, self._assumed = NOT_TOLD, NOTHING_ASSUMED
-            self.assumed = _NOT_LOOKED
-            """What the path rests on though nobody measured it, in words."""
+
+    @property
+    def assumed(self) -> str:
+        """What the path rests on though nobody measured it, in words."""
+        return self._last.rests_on
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
         """Learn a scan, whose odometry does not jump, and T_map_base (3,) at its end."""
@@ -144,14 +144,15 @@ class LiveCauses:
         of_echoes, _, suspected = echo_findings(newest.scans, self.sonar_in_base, newest.corrections)
         of_beams = [*of_standing(self._head_stood(newest.beams)), *head_causes(newest.beams)]
         of_beams += standing_causes(newest.scans, newest.track, newest.path)
-        found = _Found([*of_echoes, *of_beams], self._course, self._assumed)
+        found = _Found([*of_echoes, *of_beams], self._last.course, self._last.assumed)
         run = newest_run()
         if run is not None:
             # What a stuck compass missed is not tried: the path is not mended live.
             shown = [cause.fault for cause in found.causes if cause.fault is not None]
             shown = [fault for fault in shown if fault.kind is not FaultKind.STUCK]
-            suspected = [*suspected, *shown, *_misread(steps, run.log.node_times[0])]
-            motion = _motion_of(run, suspected, newest, self._course)
+            # Positions may have gone otherwise beside steps of the compass.
+            misread = [one.misread for one in steps if one.misread is not None and one.begin > run.log.node_times[0]]
+            motion = _motion_of(run, [*suspected, *shown, *misread], newest, self._last.course)
             spread = motion.spread(run.log.node_times[-1:])[0]
             causes = motion.told_with(of_echoes, of_beams)
             untold = UNTOLD_ALONE if motion.is_alone and motion.is_told else "nothing"
@@ -186,35 +187,27 @@ class LiveCauses:
 
         A weak cause is named after two looks in a row have found it.
         """
-        self._course, self._assumed = found.course, found.assumed
-        self.assumed = found.rests_on
-        self._shown, before = found.causes, self._shown
-        named = [one for one in self._shown if one.evidence > _AT_ONCE or any(is_alike(one, other) for other in before)]
-        kinds = {cause.fault.kind for cause in named if cause.fault is not None}
-        past = [cause for cause in self._found if cause.begin < begin and cause.fault is not None]
-        self._found = [*named, *(cause for cause in past if cause.fault.kind not in kinds)]
-        if not self._found or np.trace(found.spread) > np.trace(self._spread):
+        self._last, before = found, {cause.kind for cause in self._last.causes}
+        named = [cause for cause in found.causes if cause.evidence > _AT_ONCE or cause.kind in before]
+        told = {None, *(cause.kind for cause in named)}
+        self._named = [*named, *(one for one in self._named if one.begin < begin and one.kind not in told)]
+        if not self._named or np.trace(found.spread) > np.trace(self._spread):
             self._spread, self.by_mounts = found.spread, found.by_mounts
 
     def causes(self, steps: Sequence[Step]) -> List[Cause]:
         """Return what is wrong, ranked; steps: of the odometry, which were left out."""
-        return ranked([*of_steps(steps), *self._found])
+        return ranked([*of_steps(steps), *self._named])
 
     def covariance(self, steps: Sequence[Step]) -> np.ndarray:
         """Return what the causes add to the covariance (2, 2) [m^2] of the newest place."""
         with self._lock:
             spread = self._spread
-            assumed = [self._assumed.if_not] if self._assumed.text else []
-            if not self._places or not (steps or self._found or assumed):
+            assumed = [self._last.assumed.if_not] if self._last.assumed.text else []
+            if not self._places or not (steps or self._named or assumed):
                 return spread
             places = np.array(self._places)
         causes = [*self.causes(steps), *assumed]
         return spread + widened(np.zeros((len(places), 2, 2)), places[:, 0], places[:, 1:], causes)[-1]
-
-
-def _misread(steps: Sequence[Step], begin: float) -> List[MotionFault]:
-    """Return what is wrong if positions went otherwise beside steps of the compass after `begin` [s]."""
-    return [step.misread for step in steps if step.misread is not None and step.begin > begin]
 
 
 def _motion_of(run: Solution, suspected: Sequence[Fault], newest: _Newest, before: CourseFound) -> MotionFindings:

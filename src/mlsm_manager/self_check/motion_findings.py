@@ -63,11 +63,6 @@ class MotionFindings:
         """Whether the odometry says anything of the motion."""
         return bool(np.ptp(self.track.poses, axis=0).any())
 
-    @property
-    def places(self) -> np.ndarray:
-        """(n, 2) m in map, of the nodes."""
-        return self.run.places
-
     def spread(self, times: np.ndarray) -> np.ndarray:
         """Return what these paths add to the covariances of the position at `times` (k,) [s], (k, 2, 2) m^2."""
         added = np.zeros((len(times), 2, 2))
@@ -80,9 +75,7 @@ class MotionFindings:
         """Return the findings of a whole run with what its path T_map_base says of the sonar's mount."""
         if not self.is_told:
             return self
-        course = self._course_of(path)
-        found = self._with(course, course_causes(course, NAMED), self.places[0], True)
-        return found._assuming(assumed_of_lengths(self.run))
+        return self._with(self._course_of(path), NAMED, self.run.places[0], True, assumed_of_lengths(self.run))
 
     def with_newest_course(self, path: Track, begin: np.ndarray, before: CourseFound) -> "MotionFindings":
         """Return the findings of the newest scans likewise.
@@ -93,31 +86,29 @@ class MotionFindings:
         if not self.is_told:
             return self
         course = self._course_of(path).after(before)
-        causes = course_causes(course, NAMED_LIVE)
         # That thrusters err is usual: a run that goes on is not made unsure by it.
-        return self._with(course, causes, begin, course != NOT_TOLD)._assuming(assumed_of_distances(self.run))
+        return self._with(course, NAMED_LIVE, begin, course != NOT_TOLD, assumed_of_distances(self.run))
 
     def _with(
-        self, course: CourseFound, causes: List[Cause], begin: np.ndarray, may_hide: bool
+        self, course: CourseFound, named: float, begin: np.ndarray, may_hide: bool, assumed: Assumption
     ) -> "MotionFindings":  # fmt: skip
-        """causes: that the course names. begin: (2,) m, about which a turn of the sonar turns the places.
+        """named: deviations from which on a turn is named. begin: (2,) m, about which a turn of the sonar turns places.
 
-        may_hide: whether the odometry hides some of that turn, where no course tells which is turned.
+        may_hide: whether the odometry hides some of that turn, where no course tells which is turned. assumed: of
+        lengths, unless a cause says that these are wrong.
         """
-        places, direction = self.places, NOT_TOLD if course.is_told else self._direction
+        places, direction = self.run.places, NOT_TOLD if course.is_told else self._direction
         turn, mounts = course.unexplained, 0.0
         if direction.is_told:
             turn, mounts = (direction.hidden, direction.hidden) if may_hide else (direction.turn, 0.0)
         gone = places - begin
         aside = rotated(gone, np.full(len(gone), turn)) - gone
-        causes = [*self.causes, *(causes or self._calibration_causes())]
-        apart = [*self.apart, aside, self._late(places)]
-        by_mounts = mounts * float(np.hypot(*gone[-1]))
-        return replace(self, causes=causes, apart=apart, course=course, mounts=mounts, by_mounts=by_mounts)
-
-    def _assuming(self, assumed: Assumption) -> "MotionFindings":
-        """Return the findings with what is assumed of lengths, unless a cause says that these are wrong."""
-        return self if any(cause.length for cause in self.causes) else replace(self, assumed=assumed)
+        causes = [*self.causes, *(course_causes(course, named) or self._calibration_causes())]
+        return replace(
+            self, causes=causes, apart=[*self.apart, aside, self._late(places)], course=course, mounts=mounts,
+            by_mounts=mounts * float(np.hypot(*gone[-1])),
+            assumed=self.assumed if any(cause.length for cause in causes) else assumed,
+        )  # fmt: skip
 
     def _course_of(self, path: Track) -> CourseFound:
         if self.is_alone:  # nothing else tells a turn of the sonar, however large it is

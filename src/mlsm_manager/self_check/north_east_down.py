@@ -11,15 +11,12 @@ from node_support.geometry import composed, seen_from
 
 # m: more than waves and the drift of a depth sensor make. A vehicle that starts at the surface cannot climb so far.
 _CLIMB = 2.0
-# The odometry as it is, and turned up: x, y and yaw are multiplied by these.
-_AS_REPORTED, _TURNED_UP = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])
+_AS_REPORTED, _TURNED_UP = np.array([1.0, 1.0, 1.0]), np.array([1.0, -1.0, -1.0])  # times x, y and yaw
 # Echoes of a scan: with fewer their mean distance tells little, and more take time and tell nothing new.
 _FEWEST, _MOST = 30, 1000
 _OTHER_SURFACE = 5.0  # m: echoes that are farther from all others say no more than that something else is seen
 _CLEARLY = 1.2  # times: by less the two odometries do not differ, as on a straight way or where the vehicle stands
-# Pairs of scans that tell the two apart, and the share of them that at most may speak against the odometry.
-_LEAST_PAIRS = 5
-_SHARE = 0.7
+_LEAST_PAIRS, _SHARE = 5, 0.7  # pairs that tell the two apart, and the share that may speak against the odometry
 
 
 class ZDownSigns:
@@ -40,9 +37,8 @@ class ZDownSigns:
         """Compare a scan with the one before it."""
         vote = None if self._previous is None else _fits_turned_up(self._previous, scan)
         self._previous = scan
-        if vote is not None:
-            self._pairs += 1
-            self._against += int(vote)
+        self._pairs += vote is not None
+        self._against += bool(vote)
 
     def lines(self) -> List[str]:
         """Return one line for each sign; none where nothing speaks for z down."""

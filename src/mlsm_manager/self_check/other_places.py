@@ -36,10 +36,6 @@ class Elsewhere(NamedTuple):
     apart: np.ndarray
     gain: float
 
-    @property
-    def metres(self) -> float:
-        return float(np.hypot(*self.apart.T).max())
-
 
 def with_other_places(found: MotionFindings) -> MotionFindings:
     """Return the findings of a run by a compass alone with the likeliest of the places where it may have gone.
@@ -51,13 +47,17 @@ def with_other_places(found: MotionFindings) -> MotionFindings:
     others = other_places(found.run, found.fit)
     if not others:
         return found
-    best, farthest = max(others, key=lambda one: one.gain), max(others, key=lambda one: one.metres)
-    text = f"echoes fit nearly as well with the vehicle {farthest.metres:.1f} m elsewhere,"
+    best, farthest = max(others, key=lambda one: one.gain), max(others, key=lambda one: _metres(one.apart))
+    text = f"echoes fit nearly as well with the vehicle {_metres(farthest.apart):.1f} m elsewhere,"
     found = replace(found, causes=[*found.causes, Cause(text, 0.0, farthest.begin)])
     if best.gain <= 0.0:
         return replace(found, apart=[*found.apart, farthest.apart])
-    beside = max((-best.apart, farthest.apart - best.apart), key=lambda one: float(np.hypot(*one.T).max()))
+    beside = max((-best.apart, farthest.apart - best.apart), key=_metres)
     return replace(found, run=best.run, fit=best.fit.with_covariances(), apart=[*found.apart, beside])
+
+
+def _metres(apart: np.ndarray) -> float:
+    return float(np.hypot(*apart.T).max())
 
 
 def other_places(run: Solution, fit: BatchResult) -> List[Elsewhere]:

@@ -4,7 +4,7 @@ Honest errors come first: what currents, scales and compasses do the solver's pa
 """
 
 from dataclasses import dataclass, replace
-from typing import Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Callable, Dict, Iterable, List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -58,7 +58,11 @@ class _Heard(NamedTuple):
 
 
 class ScanPairs:
-    """Pairs of scans, and how far they lie apart under a hypothesis."""
+    """Pairs of scans, and how far they lie apart under a hypothesis.
+
+    begins, middles: (n,) s, of each scan. times: (p, 2) s, when the scans of each pair began to hear and ended. scans:
+    how many begin a pair.
+    """
 
     def __init__(
         self, scans: Sequence[Scan], sonar_in_base: np.ndarray, corrections: Optional[Track] = None
@@ -66,8 +70,14 @@ class ScanPairs:
         """sonar_in_base: (2,) m, by tf. corrections: T_map_odom as the solver found it; None where none did yet."""
         self._sonar, self._corrections = sonar_in_base, corrections
         self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
-        self._tracks = {Mirror.NOTHING: joined([scan.track for scan in scans])} if scans else {}
+        self._reported = joined([scan.track for scan in scans]) if scans else None
+        self._tracks = {mirror: mirror.of(self._reported) for mirror in Mirror} if scans else {}
         self._pairs = self._chosen()
+        self.begins = np.array([one.times[0] for one in self._heard])
+        self.middles = np.array([one.times.mean() for one in self._heard])
+        ends = [[self.begins[one], self._heard[other].times[-1]] for one, other in self._pairs]
+        self.times = np.array(ends).reshape(-1, 2)
+        self.scans = len(np.unique(self.times[:, 0]))
         self._known: Dict[Hypothesis, np.ndarray] = {}
         self._ways: Dict[Tuple[int, Hypothesis], np.ndarray] = {}
 
@@ -75,15 +85,10 @@ class ScanPairs:
     def tell(self) -> bool:
         return len(self._pairs) >= _FEWEST_PAIRS
 
-    @property
-    def times(self) -> np.ndarray:
-        """(p, 2) s, when the scans of each pair began to hear and ended."""
-        return np.array([[self._heard[one].times[0], self._heard[other].times[-1]] for one, other in self._pairs])
-
     def _chosen(self) -> List[Tuple[int, int]]:
         """Return pairs of numbers between which the vehicle moved by the odometry, in the order of time."""
         found = []
-        ends = [self._tracks[Mirror.NOTHING].at(one.times[-1]) for one in self._heard]
+        ends = [self._reported.at(one.times[-1]) for one in self._heard]
         for number in range(len(ends)):
             for apart in _APART:
                 if number + apart < len(ends):
@@ -116,16 +121,9 @@ class ScanPairs:
         went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0, slips=0.0)
         if (number, went) not in self._ways:
             times = self._heard[number].times + went.delay
-            poses = self._track(went.mirrored).at(times) * [went.scale, went.scale, 1.0]
-            poses = composed(self._corrections.at(times), poses) if went.as_solved else poses
-            self._ways[number, went] = poses
+            poses = self._tracks[went.mirrored].at(times) * [went.scale, went.scale, 1.0]
+            self._ways[number, went] = composed(self._corrections.at(times), poses) if went.as_solved else poses
         return self._ways[number, went]
-
-    def _track(self, mirrored: Mirror) -> Track:
-        """Return what the odometry said, or would have if what is mirrored were not."""
-        if mirrored not in self._tracks:
-            self._tracks[mirrored] = mirrored.of(self._tracks[Mirror.NOTHING])
-        return self._tracks[mirrored]
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
         return min(tried, key=lambda one: float(self.distances(one).mean()))
@@ -140,47 +138,55 @@ class ScanPairs:
     @property
     def way(self) -> float:
         """How far the vehicle went by the odometry, m."""
-        return float(np.hypot(*np.diff(self._track(Mirror.NOTHING).poses[:, :2], axis=0).T).sum())
-
-    @property
-    def scans(self) -> int:
-        """How many scans begin a pair."""
-        return len(np.unique(self.times[:, 0]))
+        return float(np.hypot(*np.diff(self._reported.poses[:, :2], axis=0).T).sum())
 
     def evidence(self, hypothesis: Hypothesis, other: Hypothesis) -> float:
         """Return what speaks for a hypothesis against another, nats."""
         return evidence_of(self.distances(other), self.distances(hypothesis), self.scans)
 
-    def near(self, base: Hypothesis) -> "NearPairs":
-        """Return all pairs of scans up to three apart, as they lie if `base` is right."""
-        pairs, apart = near_pairs([self._placed(number, base) for number in range(len(self._heard))])
-        begins = np.array([one.times[0] for one in self._heard])
-        middles = np.array([one.times.mean() for one in self._heard])
-        return NearPairs(pairs, begins, middles, apart)
+    def near(self, base: Hypothesis) -> Tuple[np.ndarray, np.ndarray]:
+        """Return what `near_pairs` does for all scans as they lie if `base` is right."""
+        return near_pairs([self._placed(number, base) for number in range(len(self._heard))])
+
+    def _table(self, pairs: np.ndarray, base: Hypothesis, moved: Callable[[int, int], List[np.ndarray]]) -> np.ndarray:
+        """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart with the later one at each of the places that
+        `moved` returns for their numbers.
+        """
+        columns = []
+        for one, other in pairs:
+            earlier = along_x(self._placed(one, base))
+            columns.append([_apart(earlier, places) for places in moved(one, other)])
+        return np.array(columns).T.copy()
 
     def carried(self, pairs: np.ndarray, velocities: np.ndarray, base: Hypothesis) -> np.ndarray:
         """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the vehicle went by `velocities` (k, 2) [m/s]
         faster than it does if `base` is right.
         """
-        table = np.empty((len(velocities), len(pairs)))
-        for column, (one, other) in enumerate(pairs):
-            earlier, later = along_x(self._placed(one, base)), self._placed(other, base)
-            moves = velocities * (self._heard[other].times.mean() - self._heard[one].times.mean())
-            table[:, column] = [_apart(earlier, later + move) for move in moves]
-        return table
+
+        def moved(one: int, other: int) -> List[np.ndarray]:
+            later, seconds = self._placed(other, base), self.middles[other] - self.middles[one]
+            return [later + move for move in velocities * seconds]
+
+        return self._table(pairs, base, moved)
+
+    def changed(self, pairs: np.ndarray, changes: Sequence["Change"], base: Hypothesis) -> np.ndarray:
+        """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the later one has each of `changes` (k)."""
+
+        def moved(_: int, other: int) -> List[np.ndarray]:
+            centre = self._poses(other, base)[-1, :2]
+            late = {ranges: self._placed(other, base, ranges) - centre for ranges in {one.ranges for one in changes}}
+            return [rotated(late[one.ranges], np.full(len(late[one.ranges]), one.turn)) + centre for one in changes]
+
+        return self._table(pairs, base, moved)
 
     def facing(self, numbers: Iterable[int], base: Hypothesis) -> np.ndarray:
         """Return the mean outer product (2, 2) of the normals of surfaces that some scans heard if `base` is right.
 
         Each normal is weighted by how certain it is.
         """
-        normals, qualities = [], []
-        for number in numbers:
-            places = self._placed(number, base)
-            each, certain = surface_normals(places, np.full(len(places), LEAST_REACH))
-            normals.append(each)
-            qualities.append(certain)
-        normals, qualities = np.concatenate(normals), np.concatenate(qualities)
+        placed = [self._placed(number, base) for number in numbers]
+        told = [surface_normals(places, np.full(len(places), LEAST_REACH)) for places in placed]
+        normals, qualities = map(np.concatenate, zip(*told))
         return np.einsum("n,na,nb->ab", qualities, normals, normals) / max(qualities.sum(), _NOTHING)
 
     def in_odometry(self, velocity: np.ndarray, time: float, base: Hypothesis) -> np.ndarray:
@@ -188,20 +194,6 @@ class ScanPairs:
         if not base.as_solved:
             return velocity
         return rotated(velocity[np.newaxis], -self._corrections.at(np.array([time]))[:, 2])[0]
-
-    def changed(self, pairs: np.ndarray, changes: Sequence["Change"], base: Hypothesis = AS_TOLD) -> np.ndarray:
-        """Return how far (k, p) [m] scans lie apart if the later one of `pairs` (p, 2) has each of `changes` (k).
-
-        base: what is right besides.
-        """
-        table = np.empty((len(changes), len(pairs)))
-        for column, (one, other) in enumerate(pairs):
-            earlier, centre = along_x(self._placed(one, base)), self._poses(other, base)[-1, :2]
-            late = {ranges: self._placed(other, base, ranges) - centre for ranges in {one.ranges for one in changes}}
-            for row, (turn, ranges) in enumerate(changes):
-                turns = np.full(len(late[ranges]), turn)
-                table[row, column] = _apart(earlier, rotated(late[ranges], turns) + centre)
-        return table
 
     def typical_range(self) -> float:
         """Return the median range of echoes, m."""
@@ -213,19 +205,6 @@ class Change(NamedTuple):
 
     turn: float
     ranges: float
-
-
-class NearPairs(NamedTuple):
-    """pairs: (p, 2) numbers of scans. begins, middles: (n,) s, of all scans. distances: (p,) m, of each pair."""
-
-    pairs: np.ndarray
-    begins: np.ndarray
-    middles: np.ndarray
-    distances: np.ndarray
-
-    def within(self, first: int, last: int) -> np.ndarray:
-        """Return which pairs (p,) are of the scans `first` to `last`."""
-        return (self.pairs[:, 0] >= first) & (self.pairs[:, 1] <= last)
 
 
 def near_pairs(placed: Sequence[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:

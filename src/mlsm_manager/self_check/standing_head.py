@@ -31,12 +31,6 @@ class HeadStood(NamedTuple):
     def seconds(self) -> float:
         return self.end - self.begin
 
-    @property
-    def cause(self) -> Cause:
-        text = f"the head stood for {self.seconds:.0f} s{'' if self.is_told else ' though it reported that it turns'},"
-        gone = _SPEED * float(np.sqrt(self.seconds * _STANDS)) / 2.0
-        return Cause(text, CERTAIN, self.begin, metres=gone)
-
 
 def head_stood(beams: Sequence[Beam], usual: float = 0.0) -> Tuple[List[HeadStood], float]:
     """Return when the head stood, of beams in the order of their stamps; told, it did so for more than 20 s.
@@ -55,7 +49,12 @@ def of_standing(stood: Sequence[HeadStood]) -> List[Cause]:
     told = [one for one in stood if one.is_told]
     untold = [one for one in stood if not one.is_told and one.seconds >= _NAMED]
     longest = [max(untold, key=lambda one: one.seconds)] if untold else []
-    return [one.cause for one in (*told, *longest)]
+    causes = []
+    for one in (*told, *longest):
+        text = f"the head stood for {one.seconds:.0f} s{'' if one.is_told else ' though it reported that it turns'},"
+        gone = _SPEED * float(np.sqrt(one.seconds * _STANDS)) / 2.0
+        causes.append(Cause(text, CERTAIN, one.begin, metres=gone))
+    return causes
 
 
 def _told(times: np.ndarray, angles: np.ndarray) -> List[HeadStood]:

@@ -261,7 +261,7 @@ def newest():
 
 def test_a_turned_sonar_turns_the_newest_place_about_where_the_run_began(newest):
     motion, track = newest
-    turned, here = CourseFound(np.radians(20.0), np.radians(2.0)), motion.places[-1]
+    turned, here = CourseFound(np.radians(20.0), np.radians(2.0)), motion.run.places[-1]
     near, far = (motion.with_newest_course(track, here - [0.0, gone], turned) for gone in (10.0, 100.0))
     spreads = [np.sqrt(np.trace(each.spread(motion.fit.node_times[-1:])[0])) for each in (near, far)]
     np.testing.assert_allclose(spreads, 2.0 * np.sin(turned.unexplained / 2.0) * np.array([10.0, 100.0]), rtol=0.01)
@@ -271,7 +271,7 @@ def test_a_turned_sonar_turns_the_newest_place_about_where_the_run_began(newest)
 def test_a_run_that_goes_on_names_a_turned_sonar_from_three_deviations_of_its_course_on(newest, deviations, named):
     motion, track = newest
     turned = CourseFound(deviations * np.radians(3.0), np.radians(3.0))
-    assert len(motion.with_newest_course(track, motion.places[0], turned).causes) == named
+    assert len(motion.with_newest_course(track, motion.run.places[0], turned).causes) == named
 
 
 def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
