@@ -9,8 +9,8 @@ import numpy as np
 import rospy
 from autopilot_peer import Peer
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import Diagnostics, run, wait_until
-from messages import publisher, transform
+from graph import Diagnostics, publisher, run, wait_until
+from messages import transform
 from pymavlink.dialects.v20 import ardupilotmega as mavlink
 from tf2_msgs.msg import TFMessage
 

@@ -4,22 +4,38 @@
 import signal
 import subprocess
 import sys
+import unittest
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import Field
 from enum import Enum
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Set, Tuple
 
+import rosgraph
 import rospy
 from dynamic_reconfigure.client import Client
-from graph import PACKAGE, PACKAGE_ROOT, PATIENCE, Diagnostics, ended, run, wait_until
-from node_topics import NodeTopics
+from graph import PACKAGE_ROOT, PATIENCE, Diagnostics, Inbox, ended, run, wait_until
+from sensor_msgs.msg import Image
 
 sys.path.insert(0, str(PACKAGE_ROOT / "scripts"))
 
 from document import LIVE_NODES
 
-from node_support.node_table import HOSTS
+from mlsm_manager.ros.map_publisher import has_octomap_messages
+from node_support.node_table import HOSTS, NODES, Role
 from node_support.parameters import describe
+
+# What every node has through rospy, tf and dynamic_reconfigure.
+COMMON = {"/rosout", "/diagnostics", "/clock", "/tf", "/tf_static"}
+COMMON_ENDINGS = (
+    "/parameter_descriptions", "/parameter_updates", "/set_parameters", "/get_loggers", "/set_logger_level",
+)  # fmt: skip
+# What a node has with other parameters than it has here, and where messages are installed that are missing here.
+OPTIONAL = {
+    "sonar_simulator": {"/cmd_vel", "/imu", "/depth"},
+    "autopilot_link": {"/mavros/odometry/out", "/mavros/vision_pose/pose_cov"},
+    "dead_reckoning": {"/cmd_vel", "/depth", "/dvl"},
+    "mlsm_core": set() if has_octomap_messages() else {"/MLSM/octomap"},
+}
 
 # Beyond what dynamic_reconfigure itself refuses to send: an integer has 32 bits there.
 INT_LIMIT = 2**31 - 1
@@ -28,15 +44,14 @@ REFUSED = "changes of parameters refused"
 BAD_STARTS: List[Tuple[str, str, str]] = [
     ("sonar_simulator", "world:=/nowhere.sdf", "/nowhere.sdf"),
     ("gazebo_sonar", "head:=TURN", "head = 'TURN'"),
-    ("mapping", "chain:=[none_such]", "none_such"),
-    ("sonar_processing", "chain:=5", "chain"),
+    ("sonar_processing", "chain:=[none_such]", "none_such"),
     ("thresholder", "otsu_multiplier:=.nan", "otsu_multiplier = nan: must be a number from 0 to 10"),
     ("imagenex_852_driver", "max_range:=7", "max_range = 7: not allowed by the protocol, which takes 5, 10"),
     ("ping360_driver", "port:=udp://nowhere", "must be udp://HOST:PORT"),
 ]
+# A stage that a host may run, and such a host: all nodes read their parameters as one of these does.
 UNKNOWN = "no_such_parameter:=1", "no_such_parameter = 1: no such parameter"
-# A node, a stage that a host may run, and such a host: all nodes read their parameters as one of these does.
-BAD_STARTS += [(node, *UNKNOWN) for node in ("mlsm_core", "outlier_remover", "mapping")]
+BAD_STARTS += [(node, *UNKNOWN) for node in ("mlsm_core", "mapping")]
 
 
 def bad_values(field: Field) -> List[Any]:
@@ -69,13 +84,20 @@ def start(case: Tuple[int, Tuple[str, str, str]]) -> "subprocess.CompletedProces
     return ended(command, 2 * PATIENCE, ROSCONSOLE_FORMAT="${message}")
 
 
-class EveryNode(NodeTopics):
-    """Sends what the parameter dataclasses say is not allowed, and a little that is."""
+class EveryNode(unittest.TestCase):
+    """Compares topics with the table of docs/nodes.md and --help; sends what the parameter dataclasses do not allow."""
+
+    def test_every_node_has_what_the_table_says_and_nothing_else(self) -> None:
+        """Without what all nodes have in common; sonar_image takes beams only while somebody looks at its image."""
+        viewer = Inbox("/sonar/image", Image)
+        wait_until(lambda: _differences() == {}, required=False)
+        self.assertEqual(_differences(), {})
+        viewer.close()
 
     def test_keys_of_an_older_version_are_named_in_one_warning_and_taken(self) -> None:
         """Also those that stand beside `expert` and not under it: the server then holds them where they belong."""
         keys = ("_kernel:=NUMBA", "_free_scans:=30", "_normal_deviation:=0.2")
-        command = ["rosrun", PACKAGE, "mlsm_core", "__name:=old_keys", *keys]
+        command = [str(PACKAGE_ROOT / "nodes/mlsm_core"), "__name:=old_keys", *keys]
         with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True) as node:
             wait_until(lambda: rospy.has_param("/old_keys/transform_tolerance"))
             held = rospy.get_param("/old_keys")
@@ -129,14 +151,42 @@ class EveryNode(NodeTopics):
         client.close()
 
     def test_every_bad_start_ends_with_one_line(self) -> None:
+        port = f"port:={rospy.get_param('/imagenex_852_driver/port')}"
+        cases = [*BAD_STARTS, ("imagenex_852_driver", port, "in use by another program")]
         with ThreadPoolExecutor(max_workers=2) as pool:
-            ends = list(pool.map(start, enumerate(BAD_STARTS)))
+            ends = list(pool.map(start, enumerate(cases)))
         wrong = []
-        for case, done in zip(BAD_STARTS, ends):
+        for case, done in zip(cases, ends):
             lines = [line for line in done.stdout.splitlines() if line.strip()]
             if done.returncode != 1 or len(lines) != 1 or case[-1] not in lines[0]:
                 wrong.append((case, done.returncode, done.stdout))
         self.assertEqual(wrong, [])
+
+
+def _differences() -> Dict[str, str]:
+    publishers, subscribers, services = rosgraph.Master("/every_node_test").getSystemState()
+    states = {Role.OUTPUT: publishers, Role.INPUT: subscribers, Role.SERVICE: services}
+    found = {}
+    for node in NODES:
+        for role, state in states.items():
+            real, told = _real(node, state), _told(node, role)
+            if real - told or told - real - OPTIONAL.get(node, set()):
+                found[f"{node} {role.value}"] = f"not in the table: {real - told}; only in the table: {told - real}"
+    return found
+
+
+def _real(node: str, state: list) -> Set[str]:
+    names = {name for name, nodes in state if f"/{node}" in nodes}
+    return {name for name in names - COMMON if not name.endswith(COMMON_ENDINGS)}
+
+
+def _told(node: str, role: Role) -> Set[str]:
+    told = set()
+    for one in NODES[node].interfaces:
+        if one.role is role and one.name != "tf":
+            name = rospy.resolve_name(one.name, caller_id=f"/{node}")
+            told |= {name, f"{name}/cloud"} if ".../cloud" in one.text else {name}
+    return told - COMMON
 
 
 if __name__ == "__main__":

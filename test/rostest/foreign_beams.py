@@ -9,7 +9,7 @@ import numpy as np
 import rospy
 from dynamic_reconfigure.client import Client
 from foreign_messages import message_classes, sane_message
-from graph import Diagnostics, Inbox, end_publishing, rows, run, wait_for_publisher_links
+from graph import Diagnostics, Inbox, end_publishing, publisher, rows, run
 from rosgraph_msgs.msg import Log
 from sensor_msgs.msg import LaserScan, PointCloud2
 from std_msgs.msg import String
@@ -26,31 +26,24 @@ class ForeignBeams(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.published = 0
-        cls.diagnostics, cls.log = Diagnostics(), Inbox("/rosout", Log)
-        cls.turns = Inbox("/sonar/scan/turn", PointCloud2)
-        cls.scans = Inbox("/sonar/scan/sonarCloud/cloud", PointCloud2)
-        for inbox in (cls.turns, cls.scans, cls.log):
-            inbox.wait_for_link()
+        cls.diagnostics, cls.log = Diagnostics(), Inbox("/rosout", Log).linked()
+        cls.turns = Inbox("/sonar/scan/turn", PointCloud2).linked()
+        cls.scans = Inbox("/sonar/scan/sonarCloud/cloud", PointCloud2).linked()
 
     def publish(self, kind: type, messages: Any) -> None:
         """Publish messages of one class on sonar/raw, and give the topic back for another when all have arrived."""
-        publisher = rospy.Publisher("/sonar/raw", kind, queue_size=1000)
-        wait_for_publisher_links(publisher, 1)
+        beams = publisher("/sonar/raw", kind)
         for message in messages:
-            publisher.publish(message)
+            beams.publish(message)
             type(self).published += 1
             time.sleep(0.004)
         self.diagnostics.wait_for("sonar_to_cloud", "messages in", self.published)
-        end_publishing(publisher)
-
-    def publish_turns(self, kind: str, turns: int) -> None:
-        """Publish whole turns of a head in front of a round wall; more than a turn, so that one is complete."""
-        self.publish(message_classes(kind)[kind], (sane_message(kind, step) for step in range(turns * STEPS + 10)))
+        end_publishing(beams)
 
     def wait_for_a_turn(self, kind: str) -> None:
-        """Publish turns of a kind until one has come through, and see that it is the wall."""
+        """Publish three turns of a head in front of a round wall, and see that one has come through as the wall."""
         before = len(self.turns.messages)
-        self.publish_turns(kind, 3)
+        self.publish(message_classes(kind)[kind], (sane_message(kind, step) for step in range(3 * STEPS + 10)))
         cloud = rows(self.turns.wait_for_number(before + 1)[-1])
         wall = np.linalg.norm(cloud[cloud[:, 3] == 120][:, :2], axis=1)
         self.assertGreater(wall.size, STEPS)
@@ -67,7 +60,7 @@ class ForeignBeams(unittest.TestCase):
         self.wait_for_log("it is mounted in odom at 1 2 3 m")
 
     def test_2_a_mount_by_parameters_places_the_scans(self) -> None:
-        cloud = rows(self.scans.wait_for(lambda _: True))
+        cloud = rows(self.scans.wait_for())
         wall = cloud[cloud[:, 3] == 120]
         np.testing.assert_allclose(wall[:, :3].mean(axis=0), [1.0, 2.0, 3.0], atol=0.3)
 
@@ -80,8 +73,7 @@ class ForeignBeams(unittest.TestCase):
         other = rospy.Publisher("/ping360/data", kind, queue_size=1)
         scan = LaserScan(angle_min=-3.14, angle_increment=6.28 / RAYS, range_max=50.0, ranges=[WALL] * RAYS)
         scan.header.frame_id, scan.header.stamp = "sonar", rospy.Time.now()
-        self.diagnostics.wait_for("sonar_to_cloud", "messages in", self.published)
-        before = int(self.diagnostics.values("sonar_to_cloud")["beams placed"])
+        before = self.diagnostics.known("sonar_to_cloud", "beams placed")
         self.publish(LaserScan, [scan])
         self.diagnostics.wait_for("sonar_to_cloud", "beams placed", before + RAYS)
         self.wait_for_log("/ping360/data (ping360_sonar/SonarEcho)")
@@ -101,10 +93,9 @@ class ForeignBeams(unittest.TestCase):
 
     def heard_at(self) -> float:
         """Publish a beam, and return where it hears the wall: rad, from the sonar, in odom."""
-        beams = Inbox("/sonar/beam", PointCloud2)
-        beams.wait_for_link()
+        beams = Inbox("/sonar/beam", PointCloud2).linked()
         self.publish(message_classes(MICRON)[MICRON], [sane_message(MICRON, 20)])
-        cloud = rows(beams.wait_for(lambda _: True))
+        cloud = rows(beams.wait_for())
         ahead, left = (cloud[cloud[:, 3] == 120][:, :2] - [1.0, 2.0]).mean(axis=0)
         return float(np.arctan2(left, ahead))
 

@@ -4,13 +4,11 @@
 Arguments: one or many processes, the number of messages and the seed.
 """
 
-import os
 import subprocess
 import sys
 import threading
 import time
 import unittest
-import xmlrpc.client
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, Dict, List, Set, Tuple
@@ -19,8 +17,8 @@ import numpy as np
 import rosgraph
 import rospy
 import tf2_ros
-from graph import PATIENCE, Diagnostics, Inbox, run, wait_until
-from messages import publisher, transform, turn
+from graph import PATIENCE, Diagnostics, Inbox, process_of, publisher, rows, run, wait_until
+from messages import transform, turn
 from random_messages import RandomMessages
 from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
@@ -51,11 +49,8 @@ class Fuzz(unittest.TestCase):
         cls.messages, cls.seed = int(sys.argv[2]), int(sys.argv[3])
         cls.diagnostics = Diagnostics()
         threading.Thread(target=_publish_time, daemon=True).start()
-        cls.map = Inbox("/MLSM/cloud", PointCloud2)
-        cls.map.wait_for_link()
-        reporting = cls.diagnostics.callers
-        wait_until(lambda: cls.nodes <= reporting, required=False)
-        assert cls.nodes <= reporting, f"did not start: {cls.nodes - reporting}"
+        cls.map = Inbox("/MLSM/cloud", PointCloud2).linked()
+        wait_until(lambda: cls.nodes <= cls.diagnostics.callers, told=f"not all of {cls.nodes} report")
         cls.processes = _processes()
         cls.topics = _subscribed(cls.processes)
 
@@ -64,7 +59,8 @@ class Fuzz(unittest.TestCase):
         self._publish()
         self._expect_all_alive()
         self._expect_a_scan()
-        self._expect_the_correction()
+        # A timer of its own sends it.
+        Inbox("/tf", TFMessage).wait_for(_is_correction)
         self._expect_no_internal_error()
         self._expect_all_alive()
 
@@ -82,7 +78,7 @@ class Fuzz(unittest.TestCase):
         print(f"published in {time.monotonic() - start:.0f} s")
 
     def _expect_all_alive(self) -> None:
-        dead = [node for node, pid in self.processes.items() if not _lives(pid)]
+        dead = [node for node, pid in self.processes.items() if not Path(f"/proc/{pid}").exists()]
         self.assertEqual(dead, [])
 
     def _expect_no_internal_error(self) -> None:
@@ -101,16 +97,12 @@ class Fuzz(unittest.TestCase):
         transforms.sendTransform(transform("odom", SANE_FRAME, x=FAR))
         beams = publisher("/sonar/raw", SonarScanLine)
         end = time.monotonic() + PATIENCE
-        while not any(_reaches_far(cloud) for cloud in self.map.messages):
+        while not any(np.any(np.abs(rows(cloud)[:, 0] - FAR) < 30.0) for cloud in self.map.messages):
             self.assertLess(time.monotonic(), end, f"no sane scan in the map; {self.diagnostics.all_values()}")
             for message in turn(time.time(), 1e-4, BEAMS, SANE_FRAME):
                 beams.publish(message)
                 time.sleep(0.002)
             time.sleep(1.0)
-
-    def _expect_the_correction(self) -> None:
-        """Wait for map -> odom, which a timer of its own sends."""
-        Inbox("/tf", TFMessage).wait_for(_is_correction)
 
 
 def _is_correction(message: TFMessage) -> bool:
@@ -120,10 +112,11 @@ def _is_correction(message: TFMessage) -> bool:
 
 
 def _launched(processes: str) -> Set[str]:
-    """Return the nodes that publish diagnostics: all that are launched."""
+    """Return the nodes that publish diagnostics: all that are launched but this one."""
     launch_file = Path(__file__).resolve().parent / "fuzz.launch"
-    command = ["roslaunch", "--nodes", str(launch_file), f"processes:={processes}", "files:=unused"]
-    return set(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split())
+    command = ["roslaunch", "--nodes", str(launch_file), f"processes:={processes}"]
+    told = subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout
+    return set(told.split()) - {rospy.get_name()}
 
 
 def _publish_time() -> None:
@@ -135,17 +128,10 @@ def _publish_time() -> None:
             time.sleep(CLOCK_PERIOD)
 
 
-def _reaches_far(cloud: PointCloud2) -> bool:
-    points = np.frombuffer(cloud.data, np.float32).reshape(-1, len(cloud.fields))
-    return bool(np.any(np.abs(points[:, 0] - FAR) < 30.0))
-
-
 def _processes() -> Dict[str, int]:
     """Return the process of every node but this one and those that belong to ROS."""
-    master = rosgraph.Master("/fuzz")
-    nodes = {node for part in master.getSystemState() for _, names in part for node in names}
-    own = {rospy.get_name(), "/rosout"}
-    return {node: xmlrpc.client.ServerProxy(master.lookupNode(node)).getPid("/fuzz")[2] for node in nodes - own}
+    nodes = {node for part in rosgraph.Master("/fuzz").getSystemState() for _, names in part for node in names}
+    return {node: process_of(node) for node in nodes - {rospy.get_name(), "/rosout"}}
 
 
 def _subscribed(processes: Dict[str, int]) -> Dict[str, str]:
@@ -158,14 +144,6 @@ def _subscribed(processes: Dict[str, int]) -> Dict[str, str]:
     }
     fuzzed = [(topic, kind) for topic, kind in topics.items() if topic not in NOT_FUZZED]
     return {topic: TAKEN_AS_ANY_TYPE[topic] if kind == "*" else kind for topic, kind in fuzzed}
-
-
-def _lives(pid: int) -> bool:
-    try:
-        os.kill(pid, 0)
-    except OSError:
-        return False
-    return True
 
 
 if __name__ == "__main__":

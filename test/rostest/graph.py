@@ -63,10 +63,10 @@ def skip(name: str, reason: str) -> None:
     raise unittest.SkipTest(reason)
 
 
-def temporary_folder(case: unittest.TestCase) -> Path:
-    """Return a folder that is removed at the end of a test."""
+def temporary_folder(clean_up: Callable[..., Any]) -> Path:
+    """Return a folder that is removed at the end of the test, or class, whose `clean_up` is given."""
     folder = tempfile.mkdtemp()
-    case.addCleanup(shutil.rmtree, folder)
+    clean_up(shutil.rmtree, folder)
     return Path(folder)
 
 
@@ -97,11 +97,12 @@ class Inbox:
             self._messages.append(message)
             self._condition.notify_all()
 
-    def wait_for_link(self) -> None:
-        """Wait until a publisher is connected and knows it, so that no message is missed from then on."""
+    def linked(self) -> "Inbox":
+        """Wait until a publisher is connected and knows it, so that no message is missed from then on; return self."""
         topic, listener = self._subscriber.resolved_name, rospy.get_name()
         told = f"{topic}: nobody publishes it"
         wait_until(lambda: any(listener in _others(node, topic, "o") for node in nodes_of(topic)[0]), told=told)
+        return self
 
     def wait_for(self, fits: Callable[[Any], bool] = lambda _: True, timeout: float = PATIENCE) -> Any:
         """Return the first message that fits, of the newest and of all that come after it.
@@ -119,15 +120,10 @@ class Inbox:
                 if not self._condition.wait(max(end - time.monotonic(), 0.0)):
                     raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {seen} messages came")
 
-    def wait(self, ready: Callable[[List[Any]], bool], timeout: float = PATIENCE) -> bool:
-        """Wait until the messages satisfy `ready`; return whether they do."""
-        with self._condition:
-            return self._condition.wait_for(lambda: ready(self._messages), timeout)
-
-    def wait_for_more(self, count: int = 1) -> List[Any]:
-        """Return the next `count` messages; raises AssertionError when they do not come."""
+    def next(self) -> Any:
+        """Return the next message; raises AssertionError when it does not come."""
         start = len(self.messages)
-        return self.wait_for_number(start + count)[start : start + count]
+        return self.wait_for_number(start + 1)[start]
 
     def wait_for_number(self, number: int, timeout: float = PATIENCE) -> List[Any]:
         """Return all messages once at least `number` have come; raises AssertionError after `timeout` seconds."""
@@ -195,31 +191,34 @@ class Diagnostics:
         return int(self._values.get(stage, {}).get(counter, -1))
 
 
-def wait_for_subscribers(topic: str, number: int, timeout: float = PATIENCE) -> None:
-    """Wait until `number` nodes listen to a topic and every publisher that it has is connected to all of them."""
-    wait_until(lambda: _is_heard(topic, number), timeout, told=f"{topic}: not {number} connected listeners")
+def publisher(topic: str, kind: type, listeners: int = 1) -> rospy.Publisher:
+    """Return a publisher that so many nodes are connected to."""
+    made = rospy.Publisher(topic, kind, queue_size=1000, tcp_nodelay=True)
+    wait_for_listeners(made, listeners)
+    return made
+
+
+def wait_for_listeners(publisher: rospy.Publisher, number: int = 1) -> None:
+    """Wait until `number` nodes are connected to a publisher of this process."""
+    told = f"{publisher.name}: not {number} connections"
+    wait_until(lambda: publisher.get_num_connections() >= number, told=told)
 
 
 def wait_for_links(topic: str, number: int = 1) -> None:
     """Wait until somebody publishes a topic, `number` nodes listen to it, and all are connected."""
-    told = f"{topic}: no publisher with {number} connected listeners"
-    wait_until(lambda: bool(nodes_of(topic)[0]) and _is_heard(topic, number), told=told)
 
+    def are_linked() -> bool:
+        publishers, listeners = nodes_of(topic)
+        is_heard = all(len(_others(node, topic, "o")) >= number for node in publishers)
+        return bool(publishers) and len(listeners) >= number and is_heard
 
-def _is_heard(topic: str, number: int) -> bool:
-    publishers, listeners = nodes_of(topic)
-    return len(listeners) >= number and all(_links(node, topic) >= number for node in publishers)
+    wait_until(are_linked, told=f"{topic}: no publisher with {number} connected listeners")
 
 
 def nodes_of(topic: str) -> Tuple[List[str], List[str]]:
     """Return the nodes that publish a topic, and those that listen to it."""
     publishers, subscribers, _ = rosgraph.Master("/graph_test").getSystemState()
     return dict(publishers).get(topic, []), dict(subscribers).get(topic, [])
-
-
-def _links(node: str, topic: str, direction: str = "o") -> int:
-    """Return the number of established connections over which a node publishes a topic, or takes it ("i")."""
-    return len(_others(node, topic, direction))
 
 
 def _others(node: str, topic: str, direction: str) -> List[str]:
@@ -267,16 +266,22 @@ def launched(launch_file: str, *arguments: str) -> Iterator[None]:
         launch.wait(timeout=PATIENCE)
 
 
+def process_of(node: str) -> int:
+    """Return the process of a node."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node)).getPid("/graph_test")[2]
+
+
+def launch(clean_up: Callable[..., Any], launch_file: str, *arguments: str) -> None:
+    """Run a launch file of the package until the end of the test, or class, whose `clean_up` is given."""
+    running = launched(launch_file, *arguments)
+    running.__enter__()
+    clean_up(running.__exit__, None, None, None)
+
+
 def rows(cloud: Any) -> np.ndarray:
     """Return the points of a float32 PointCloud2 as (n, fields), sorted, so that clouds can be compared."""
     data = np.frombuffer(cloud.data, dtype=np.float32).reshape(-1, len(cloud.fields))
     return data[np.lexsort(data.T[::-1])]
-
-
-def wait_for_publisher_links(publisher: rospy.Publisher, number: int) -> None:
-    """Wait until `number` nodes are connected to a publisher of this process."""
-    told = f"{publisher.name}: not {number} connections"
-    wait_until(lambda: publisher.get_num_connections() >= number, told=told)
 
 
 def end_publishing(publisher: rospy.Publisher) -> None:
@@ -287,14 +292,4 @@ def end_publishing(publisher: rospy.Publisher) -> None:
     topic = publisher.resolved_name
     publisher.unregister()
     told = f"{topic}: still connected"
-    wait_until(lambda: not any(_links(node, topic, "i") for node in nodes_of(topic)[1]), told=told)
-
-
-def forget_links(publisher: rospy.Publisher, message: Any) -> None:
-    """Send messages to nodes that were killed until rospy has noticed: their links look like those of new nodes."""
-
-    def are_forgotten() -> bool:
-        publisher.publish(message)
-        return publisher.get_num_connections() == 0
-
-    wait_until(are_forgotten, told=f"{publisher.name}: still linked to a node that was killed")
+    wait_until(lambda: not any(_others(node, topic, "i") for node in nodes_of(topic)[1]), told=told)

@@ -5,12 +5,12 @@ import tempfile
 import unittest
 from functools import partial
 from pathlib import Path
-from typing import Any, List, Tuple
+from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 import rosbag
 import rospy
-from graph import TEST_DATA, Diagnostics, Inbox, recording, rows, run, wait_for_subscribers, wait_until
+from graph import TEST_DATA, Diagnostics, Inbox, recording, rows, run, wait_until
 from nav_msgs.msg import Odometry
 from playback import Step, play
 from scipy.spatial import cKDTree
@@ -46,12 +46,11 @@ class Marina(unittest.TestCase):
             minutes = Path(folder) / "minutes.bag"
             cut(whole, minutes)
             cls.replayed = replayed(minutes)
-            wait_for_subscribers("/sonar/raw", 1)
-            fixes.wait_for_link()
+            fixes.linked()
             play(minutes, RATE, steps(cls.replayed, fixes))
         diagnostics.wait_for("mlsm_core", "scans in", len(cls.replayed.updates))
         wait_until(lambda: len(fixes.messages) >= cls.replayed.matched, required=False)
-        cls.fixes = [(stamp(fix), planar(fix.pose.pose.position, fix.pose.pose.orientation)) for fix in fixes.messages]
+        cls.fixes = poses([(fix, fix.pose.pose.position, fix.pose.pose.orientation) for fix in fixes.messages])
         last = cls.replayed.updates[-1].scan.reference_time
         wait_until(lambda: corrections(transforms)[0][-1] >= last)
         cls.corrections = corrections(transforms)
@@ -62,13 +61,14 @@ class Marina(unittest.TestCase):
     def test_the_scans_that_map_bag_matches_are_matched(self) -> None:
         """All but the first five, which make the first block of the map."""
         self.assertGreaterEqual(self.replayed.matched, len(self.replayed.updates) - 5)
-        self.assertEqual(len(self.fixes), self.replayed.matched)
+        self.assertEqual(len(self.fixes[0]), self.replayed.matched)
 
     def test_every_fix_is_the_one_of_map_bag(self) -> None:
         """With beams corrected by sonar_to_cloud and scans by mlsm_core, though the odometry is off by metres."""
         matched = [update for update in self.replayed.updates if update.result is not None]
-        expected = [(update.scan.reference_time, update.result.pose) for update in matched]
-        errors = np.array([pose - nearest(expected, time) for time, pose in self.fixes])
+        stamps, found = self.fixes
+        np.testing.assert_allclose(stamps, [update.scan.reference_time for update in matched], rtol=0.0, atol=1e-3)
+        errors = found - [update.result.pose for update in matched]
         self.assertLess(np.hypot(*errors[:, :2].T).max(), SAME_PLACE)
         self.assertLess(np.abs(wrapped(errors[:, 2])).max(), SAME_HEADING)
 
@@ -119,28 +119,16 @@ def replayed(bag: Path) -> Replayed:
     )
 
 
-def nearest(poses: list, wanted: float) -> np.ndarray:
-    """Return the pose whose time is within a millisecond of the wanted one; raises AssertionError for none."""
-    time, pose = min(poses, key=lambda entry: abs(entry[0] - wanted))
-    assert abs(time - wanted) < 1e-3, f"map_bag has no scan that ends at {wanted:.3f}"
-    return pose
-
-
 def corrections(transforms: Inbox) -> Tuple[np.ndarray, np.ndarray]:
     """Return stamps (n,) and T_map_odom (n, 3) that were sent."""
     found = [t for message in transforms.messages for t in message.transforms if t.header.frame_id == "map"]
-    poses = [planar(t.transform.translation, t.transform.rotation) for t in found]
-    return np.array([stamp(t) for t in found]), np.array(poses)
+    return poses([(t, t.transform.translation, t.transform.rotation) for t in found])
 
 
-def stamp(message: Any) -> float:
-    """Return the stamp of a message, s."""
-    return message.header.stamp.to_sec()
-
-
-def planar(position: Any, rotation: Any) -> np.ndarray:
-    """Return x, y [m] and yaw [rad] of a level pose."""
-    return np.array([position.x, position.y, 2.0 * np.arctan2(rotation.z, rotation.w)])
+def poses(stamped: Sequence[Tuple[Any, Any, Any]]) -> Tuple[np.ndarray, np.ndarray]:
+    """Return stamps (n,) [s] and x, y [m] and yaw [rad] (n, 3) of messages with their positions and level rotations."""
+    values = [(at.x, at.y, 2.0 * np.arctan2(turn.z, turn.w)) for _, at, turn in stamped]
+    return np.array([message.header.stamp.to_sec() for message, _, _ in stamped]), np.array(values)
 
 
 if __name__ == "__main__":

@@ -1,12 +1,11 @@
 """Messages that several rostests send, and what they read of poses."""
 
 import math
-from typing import Any, List, Sequence, Tuple
+from typing import Any, List, Optional, Sequence, Tuple
 
 import numpy as np
 import rospy
 from geometry_msgs.msg import TransformStamped
-from graph import wait_for_publisher_links
 
 from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
@@ -14,13 +13,6 @@ from underwater_map_construction.msg import SonarScanLine, StampedIntensityCloud
 
 # Of a beam of 50 bins: a wall among weak echoes.
 WALL = bytes([3] * 20 + [120] * 3 + [3] * 27)
-
-
-def publisher(topic: str, kind: type, listeners: int = 1) -> rospy.Publisher:
-    """Return a publisher that so many nodes are connected to."""
-    made = rospy.Publisher(topic, kind, queue_size=1000, tcp_nodelay=True)
-    wait_for_publisher_links(made, listeners)
-    return made
 
 
 def transform(
@@ -46,11 +38,16 @@ def turn(start: float, period: float, beams: int, frame: str = "sonar") -> List[
     return [beam(start + step * period, 2.0 * math.pi * step / beams, frame=frame) for step in range(beams)]
 
 
-def still_cloud(points: Sequence, frame: str = "odom") -> StampedIntensityCloud:
-    """Return points (n, 4) that a vehicle that stands still hears now."""
-    now = rospy.Time.now()
-    stamps = np.full(len(points), -now.to_sec())
-    return cloud_to_message(Cloud(np.asarray(points, dtype=np.float32), stamps, now.to_nsec(), frame))
+def still_cloud(points: Sequence, frame: str = "odom", times: Optional[np.ndarray] = None) -> StampedIntensityCloud:
+    """Return points (n, 4) that a vehicle that stands still hears now, or at `times` (n,) [s]."""
+    times = np.full(len(points), rospy.get_time()) if times is None else times
+    end = round(1e9 * times[-1]) if len(times) else rospy.Time.now().to_nsec()
+    return cloud_to_message(Cloud(np.asarray(points, dtype=np.float32), -times, end, frame))
+
+
+def still_echoes(places: np.ndarray, times: np.ndarray) -> StampedIntensityCloud:
+    """Return equally strong echoes at places (n, 2) in odom, 2 m deep, as still_cloud does."""
+    return still_cloud(np.column_stack([places, np.tile([-2.0, 50.0], (len(places), 1))]), times=times)
 
 
 def place(message: Any) -> np.ndarray:

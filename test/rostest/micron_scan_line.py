@@ -2,10 +2,9 @@
 """A real Micron of another team, in its own message type and without any tf: every beam arrives in the map."""
 
 import unittest
-from contextlib import ExitStack
 
 import numpy as np
-from graph import LONG_PATIENCE, Diagnostics, Inbox, launched, recording, rows, run
+from graph import LONG_PATIENCE, Diagnostics, Inbox, launch, recording, rows, run
 from sensor_msgs.msg import PointCloud2
 
 BEAMS = 2028
@@ -24,9 +23,7 @@ class MicronScanLine(unittest.TestCase):
         cls.diagnostics = Diagnostics()
         cls.map = Inbox("/MLSM/cloud", PointCloud2)
         cls.turns = Inbox("/sonar/scan/polar/cloud", PointCloud2)
-        playback = ExitStack()
-        cls.addClassCleanup(playback.close)
-        playback.enter_context(launched("play_bag.launch", f"bag:={bag}", *ARGUMENTS))
+        launch(cls.addClassCleanup, "play_bag.launch", f"bag:={bag}", *ARGUMENTS)
         cls.diagnostics.wait_for("sonar_to_cloud", "beams placed", BEAMS, LONG_PATIENCE)
 
     def test_no_beam_is_lost(self) -> None:

@@ -8,8 +8,7 @@ from typing import Any
 import genpy.dynamic
 import rospy
 from geometry_msgs.msg import Point
-from graph import Diagnostics, Inbox, run
-from messages import publisher
+from graph import Diagnostics, Inbox, publisher, run
 from sensor_msgs.msg import JointState, PointCloud2
 from std_msgs.msg import Float64, Header
 
@@ -28,8 +27,7 @@ class ThesisTopics(unittest.TestCase):
     """Sends what the nodes of today send, and listens where programs of 2015 do."""
 
     def check_passed_on(self, topic: str, old: str, message: Any) -> None:
-        inbox = Inbox(old, type(message))
-        inbox.wait_for_link()
+        inbox = Inbox(old, type(message)).linked()
         publisher(topic, type(message)).publish(message)
         inbox.wait_for(lambda found: found == message)
 
@@ -43,9 +41,8 @@ class ThesisTopics(unittest.TestCase):
         self.check_passed_on("/sonar_servo/command", f"{SERVO}/command", Float64(data=0.5))
 
     def test_each_wall_comes_alone_and_as_pcl_has_it(self) -> None:
-        walls, models = Inbox("/sonar/walls/coeff", Wall), Inbox("/sonar/walls/model", ModelCoefficients)
-        for inbox in (walls, models):
-            inbox.wait_for_link()
+        walls = Inbox("/sonar/walls/coeff", Wall).linked()
+        models = Inbox("/sonar/walls/model", ModelCoefficients).linked()
         ahead = Wall(distance=8.0, orientation=math.pi / 2.0, start=Point(-3.0, 8.0, -2.0), end=Point(1.0, 8.0, -2.0))
         dot = Wall(start=Point(5.0, 0.0, 0.0), end=Point(5.0, 0.0, 0.0))
         publisher("/sonar/scan/line/coefficients", Walls).publish(Walls(Header(frame_id="odom"), [ahead, dot]))
@@ -60,8 +57,7 @@ class ThesisTopics(unittest.TestCase):
         self.assertEqual(ModelCoefficients._md5sum, "ca27dea75e72cb894cd36f9e5005e93e")
 
     def test_states_of_the_servo_become_joint_states(self) -> None:
-        joints, diagnostics = Inbox("/joint_states", JointState), Diagnostics()
-        joints.wait_for_link()
+        joints, diagnostics = Inbox("/joint_states", JointState).linked(), Diagnostics()
         for number, definition in enumerate((INDIGO, NOETIC), start=1):
             kind = genpy.dynamic.generate_dynamic(STATE, definition + HEADER)[STATE]
             states = publisher(f"{SERVO}/state", kind)

@@ -9,8 +9,6 @@ from pathlib import Path
 from typing import Callable, List, Sequence
 
 import genpy
-import numpy as np
-import rosbag
 import rospy
 from graph import nodes_of, wait_for_links
 from rosgraph_msgs.msg import Clock
@@ -31,15 +29,16 @@ class Step:
     wait: Callable[[], object]
 
 
-def play(bag: Path, rate: float, steps: Sequence[Step] = ()) -> None:
+def play(bag: Path, rate: float, steps: Sequence[Step], listeners: int = 1) -> None:
     """Publish the messages of a bag and the clock to all who listen, `rate` times as fast as they were recorded.
 
-    It begins when every listener is connected to every topic, and stops at each of the steps, which are in the order
-    of time.
+    It begins when so many listeners of beams, and every listener of the other topics, are connected, and stops at each
+    of the steps, which are in the order of time.
     """
     messages, left = _messages(bag), deque(steps)
     kinds = {topics.CLOCK: Clock, **{played.topic: type(played.message) for played in messages}}
     publishers = {topic: _publisher(topic, kind) for topic, kind in kinds.items()}
+    wait_for_links("/sonar/raw", listeners)
     for topic in publishers:
         wait_for_links(topic, len(nodes_of(topic)[1]))
     start, now, pace = messages[0].time, -1.0, Pace(rate, threading.Event().wait)
@@ -53,12 +52,6 @@ def play(bag: Path, rate: float, steps: Sequence[Step] = ()) -> None:
         publishers[played.topic].publish(played.message)
     for step in left:
         step.wait()
-
-
-def steps_every(seconds: float, bag: Path, wait: Callable[[], object]) -> List[Step]:
-    """Return steps of a bag that wait for the same every few seconds."""
-    with rosbag.Bag(str(bag)) as recorded:
-        return [Step(time, wait) for time in np.arange(recorded.get_start_time(), recorded.get_end_time(), seconds)]
 
 
 @lru_cache(maxsize=1)

@@ -5,15 +5,10 @@ import os
 import signal
 import threading
 import unittest
-import xmlrpc.client
-from contextlib import ExitStack
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import rosbag
-import rosgraph
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import TEST_DATA, Diagnostics, Inbox, launched, run
+from graph import TEST_DATA, Diagnostics, Inbox, launch, process_of, run, temporary_folder
 from old_bag import with_old_types
 from rosgraph_msgs.msg import Clock, Log
 from sensor_msgs.msg import PointCloud2
@@ -43,14 +38,12 @@ class PlayBag(unittest.TestCase):
         cls.ends = Inbox("/rosout", Log, lambda line: " has ended after " in line.msg)
         cls.fixes, cls.diagnostics = Inbox("/MLSM/pose", PoseWithCovarianceStamped), Diagnostics()
         cls.matched, cls.walls = Inbox("/debug_cloud", PointCloud2), Inbox("/sonar/walls/coeff", Wall)
-        playback = ExitStack()
-        cls.addClassCleanup(playback.close)
-        folder = Path(playback.enter_context(TemporaryDirectory()))
+        folder = temporary_folder(cls.addClassCleanup)
         with_old_types(BAG, folder / "old.bag", BEAMS)
         (folder / "ours.yaml").write_text(migrated_text(FILES))
         files = f"bag:={folder / 'old.bag'}", f"parameters:={folder / 'ours.yaml'}"
         arguments = (*files, f"beams:={BEAMS}", "thesis:=true", "rate:=12", "matching:=true", "rviz:=false")
-        playback.enter_context(launched("play_bag.launch", *arguments))
+        launch(cls.addClassCleanup, "play_bag.launch", *arguments)
         with rosbag.Bag(str(BAG)) as bag:
             cls.beams = bag.get_message_count("/sonar/raw")
         for placed in (1, cls.beams // 2, cls.beams - 150):
@@ -79,8 +72,7 @@ class PlayBag(unittest.TestCase):
 
 def stop(node: str) -> None:
     """Stop a node's process for two seconds."""
-    uri = rosgraph.Master("/play_bag_test").lookupNode(node)
-    _, _, process = xmlrpc.client.ServerProxy(uri).getPid("/play_bag_test")
+    process = process_of(node)
     os.kill(process, signal.SIGSTOP)
     try:
         threading.Event().wait(STOP)

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import LONG_PATIENCE, Diagnostics, Inbox, run
-from messages import place, publisher, true_places, variance
+from graph import LONG_PATIENCE, Diagnostics, Inbox, publisher, run
+from messages import place, true_places, variance
 from nav_msgs.msg import Odometry
 from std_msgs.msg import Header
 

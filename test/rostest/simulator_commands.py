@@ -8,20 +8,18 @@ import time
 import unittest
 
 import rospy
-from geometry_msgs.msg import Twist
-from graph import PACKAGE, PATIENCE, Diagnostics, Inbox, run
-from messages import publisher
+from geometry_msgs.msg import Twist, Vector3
+from graph import PACKAGE_ROOT, PATIENCE, Diagnostics, Inbox, publisher, run
 from nav_msgs.msg import Odometry
+from std_msgs.msg import Header
 
 from underwater_map_construction.msg import StampedIntensityCloud
 
 ATTEMPTS = 5
 
 
-def _command(surge: float = 0.0, sway: float = 0.0) -> Twist:
-    command = Twist()
-    command.linear.x, command.linear.y = surge, sway
-    return command
+def _command(surge: float, sway: float = 0.0) -> Twist:
+    return Twist(linear=Vector3(surge, sway, 0.0))
 
 
 def _goes_on_at_speed(truth: Odometry) -> bool:
@@ -31,9 +29,7 @@ def _goes_on_at_speed(truth: Odometry) -> bool:
 
 
 def _echoes(stamp: rospy.Time) -> StampedIntensityCloud:
-    made = StampedIntensityCloud()
-    made.header.stamp = stamp
-    return made
+    return StampedIntensityCloud(header=Header(stamp=stamp))
 
 
 class SimulatorCommands(unittest.TestCase):
@@ -64,19 +60,12 @@ class SimulatorCommands(unittest.TestCase):
         self.assertLess((still.header.stamp - last.header.stamp).to_sec(), 8.0)
         self.assertLess(still.pose.pose.position.x - last.pose.pose.position.x, 1.0)
 
-    def test_bad_commands_are_counted_and_change_nothing(self) -> None:
-        still = self.truth.wait_for(lambda m: m.twist.twist.linear.x == 0.0)
-        for bad in (math.nan, math.inf):
-            self.commands.publish(_command(bad))
-            self.diagnostics.wait_for("sonar_simulator", "velocity commands refused", 1)
-        self.diagnostics.wait_for("sonar_simulator", "velocity commands refused", 2)
-        later = self.truth.wait_for(lambda m: m.header.stamp > still.header.stamp + rospy.Duration(1.0))
-        self.assertEqual(later.pose.pose.position, still.pose.pose.position)
-
-    def test_commands_beyond_its_powers_are_limited_and_counted(self) -> None:
+    def test_commands_beyond_its_powers_are_limited_and_senseless_ones_refused(self) -> None:
+        self.commands.publish(_command(math.nan))
         fast = self._drive(_command(-9.0), lambda m: m.twist.twist.linear.x < -0.9)
         self.assertGreaterEqual(fast.twist.twist.linear.x, -1.0)
         self.diagnostics.wait_for("sonar_simulator", "velocity commands limited", 1)
+        self.diagnostics.wait_for("sonar_simulator", "velocity commands refused", 1)
 
     def test_time_waits_for_echoes_that_are_overdue(self) -> None:
         """They came each second; two seconds after the last ones time stands, until others come."""
@@ -113,7 +102,7 @@ class SimulatorCommands(unittest.TestCase):
 
     def _seconds_to_end(self) -> float:
         """Return how long a simulator of its own takes to end after Ctrl-C, s."""
-        command = ["rosrun", PACKAGE, "sonar_simulator", "__ns:=/other", "_wait_for_listener:=false"]
+        command = [str(PACKAGE_ROOT / "nodes/sonar_simulator"), "__ns:=/other", "_wait_for_listener:=false"]
         others = ["robot_description:=/robot_description", "/clock:=/other_clock", "/tf:=/other_tf"]
         process = subprocess.Popen([*command, "_real_time_factor:=0.01", *others], stdout=subprocess.PIPE, text=True)
         self.addCleanup(process.kill)

@@ -10,14 +10,12 @@ import rospkg
 import rospy
 import yaml
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import PACKAGE_ROOT, Diagnostics, Inbox, run, skip, wait_for_links
-from messages import publisher
+from graph import PACKAGE_ROOT, Diagnostics, Inbox, publisher, run, skip, wait_for_links
+from messages import still_echoes
 from nav_msgs.msg import Odometry
 from rep_rules import broken_rules, broken_tree
 from tf2_msgs.msg import TFMessage
 
-from sonar_processing.cloud import Cloud
-from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import PositionStatus, StampedIntensityCloud
 
 SCANS = 8
@@ -31,20 +29,18 @@ class Standing(unittest.TestCase):
 
     @classmethod
     def setUpClass(cls) -> None:
-        cls.fixes, cls.transforms = Inbox("/MLSM/odometry", Odometry), Inbox("/tf", TFMessage)
-        cls.poses = Inbox("/MLSM/pose", PoseWithCovarianceStamped)
+        cls.fixes, cls.transforms = Inbox("/MLSM/odometry", Odometry).linked(), Inbox("/tf", TFMessage)
+        cls.poses = Inbox("/MLSM/pose", PoseWithCovarianceStamped).linked()
         cls.statuses = Inbox("/MLSM/status", PositionStatus)
         cls.filtered = Inbox("/odometry/filtered", Odometry)
         cls.filter = start_filter()
         cls.diagnostics = Diagnostics()
         cls.publisher = publisher("/sonar/scan/echoes", StampedIntensityCloud)
         wait_for_links("/tf_static")
-        cls.fixes.wait_for_link()
-        cls.poses.wait_for_link()
         cls.transforms.wait_for()
         start = rospy.Time.now().to_sec()
         for turn in range(SCANS):
-            cls.publisher.publish(cloud_to_message(scan(start + turn * SECONDS, 0.5 * (turn > 0))))
+            cls.publisher.publish(scan(start + turn * SECONDS, 0.5 * (turn > 0)))
         cls.diagnostics.wait_for("mlsm_core", "scans in", SCANS)
 
     def test_every_scan_after_the_first_gives_a_fix(self) -> None:
@@ -87,13 +83,11 @@ def start_filter() -> Optional["subprocess.Popen[bytes]"]:
     return subprocess.Popen(["rosrun", FILTER, "ekf_localization_node", "__name:=ekf"])
 
 
-def scan(start: float, moved: float) -> Cloud:
+def scan(start: float, moved: float) -> StampedIntensityCloud:
     """Return the echoes of all walls as heard from x = `moved` [m], in odom, from `start` [s] on."""
     points = np.vstack([np.linspace(*ends, 40) for ends in np.array(WALLS, dtype=float)])
     points = points[np.argsort(np.arctan2(points[:, 1], points[:, 0]))] - [moved, 0.0]
-    times = start + np.linspace(0.0, SECONDS, len(points))
-    rows = np.column_stack([points, np.full(len(points), -2.0), np.full(len(points), 50.0)])
-    return Cloud(rows.astype(np.float32), -times, round(times[-1] * 1e9), "odom")
+    return still_echoes(points, start + np.linspace(0.0, SECONDS, len(points)))
 
 
 if __name__ == "__main__":

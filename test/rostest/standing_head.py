@@ -2,34 +2,35 @@
 """A head that stands though it reports that it turns is named while the vehicle goes on."""
 
 import unittest
-from contextlib import ExitStack
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import rosbag
-from graph import TEST_DATA, Diagnostics, launched, run, wait_until
+from graph import TEST_DATA, Diagnostics, launch, run, temporary_folder, wait_until
 
 STANDS_FROM = 110.0  # s, of a bag of 160
 BEAMS = "/sonar/raw"
 
 
 class StandingHead(unittest.TestCase):
-    """Plays a tour of the basin in which all beams from a moment on hear the same."""
+    """Plays a tour of the basin in which all beams from a moment on hear the same, once for all tests."""
+
+    @classmethod
+    def setUpClass(cls) -> None:
+        cls.told = {node: Diagnostics(node) for node in ("/mapping", "/alone/mlsm_core")}
+        bag = temporary_folder(cls.addClassCleanup) / "standing.bag"
+        with_standing_head(TEST_DATA / "basin.bag", bag)
+        arguments = f"bag:={bag}", "processes:=one", "rate:=10", "shapes:=false", "rviz:=false"
+        launch(cls.addClassCleanup, "play_bag.launch", *arguments)
 
     def test_mlsm_core_names_it_in_the_process_that_has_the_beams(self) -> None:
-        self.assert_named("one")
+        self.assert_named("/mapping")
 
     def test_mlsm_core_names_it_as_a_node_of_its_own(self) -> None:
-        self.assert_named("many")
+        self.assert_named("/alone/mlsm_core")
 
-    def assert_named(self, processes: str) -> None:
-        diagnostics = Diagnostics()
-        with ExitStack() as playback:
-            bag = Path(playback.enter_context(TemporaryDirectory())) / "standing.bag"
-            with_standing_head(TEST_DATA / "basin.bag", bag)
-            arguments = f"bag:={bag}", f"processes:={processes}", "rate:=10", "shapes:=false", "rviz:=false"
-            playback.enter_context(launched("play_bag.launch", *arguments))
-            wait_until(lambda: "the head stood for " in diagnostics.values("mlsm_core").get("causes", ""), 120.0)
+    def assert_named(self, node: str) -> None:
+        causes = "the head stood for "
+        wait_until(lambda: causes in self.told[node].values("mlsm_core").get("causes", ""), 120.0)
 
 
 def with_standing_head(source: Path, copy: Path) -> None:

@@ -3,6 +3,7 @@
 
 import math
 import unittest
+from itertools import groupby
 
 import numpy as np
 import rospy
@@ -16,31 +17,10 @@ from underwater_map_construction.srv import SetScanMode
 FLOOR = -5.5
 
 
-def tilts(beams: list) -> list:
-    """Return how many beams were taken at each tilt, as (degrees, beams) in the order of time."""
-    found = []
-    for beam in beams:
-        degrees = math.degrees(beam.sensorAngle)
-        if found and abs(found[-1][0] - degrees) < 0.05:
-            found[-1][1] += 1
-        else:
-            found.append([degrees, 1])
-    return found
-
-
 def whole_scans(beams: Inbox) -> list:
     """Return the tilts at which a full turn was scanned, in whole degrees, in the order of time."""
-    return [round(degrees) for degrees, count in tilts(beams.messages) if count >= 120]
-
-
-def points_on_floor(cloud: PointCloud2) -> int:
-    """Return how many points of a map are within 0.5 m of the floor."""
-    return np.count_nonzero(np.abs(rows(cloud)[:, 2] - FLOOR) < 0.5)
-
-
-def sent(commands: Inbox) -> list:
-    """Return the commanded tilts so far, in whole degrees."""
-    return [round(math.degrees(command.data)) for command in commands.messages]
+    tilts = groupby(round(math.degrees(beam.sensorAngle), 1) for beam in beams.messages)
+    return [round(degrees) for degrees, same in tilts if len(list(same)) >= 120]
 
 
 def follow(wanted: list, found: list) -> bool:
@@ -53,14 +33,13 @@ class SonarControl(unittest.TestCase):
 
     def test_1_a_sweep_scans_every_tilt_whole_and_finds_the_floor(self) -> None:
         """A full turn at -20, 0 and 20 degrees."""
-        beams = Inbox("/sonar/raw", SonarScanLine)
-        cloud = Inbox("/MLSM/cloud", PointCloud2)
+        beams, cloud = Inbox("/sonar/raw", SonarScanLine), Inbox("/MLSM/cloud", PointCloud2)
         commands = Inbox("/sonar_servo/command", Float64)
         Inbox("/sonar_control/sweeps", UInt32).wait_for()
         # The count of sweeps may overtake beams and commands: topics have no common order.
         beams.wait_for(lambda _: follow([-20, 0, 20], whole_scans(beams)))
-        commands.wait_for(lambda _: follow([0, 20, 0], sent(commands)))
-        cloud.wait_for(lambda message: points_on_floor(message) > 50)
+        commands.wait_for(lambda _: follow([0, 20, 0], [round(math.degrees(one.data)) for one in commands.messages]))
+        cloud.wait_for(lambda message: np.count_nonzero(np.abs(rows(message)[:, 2] - FLOOR) < 0.5) > 50)
 
     def test_2_a_mode_that_does_not_exist_is_refused(self) -> None:
         rospy.wait_for_service("/sonar_control/set_mode", PATIENCE)

@@ -6,8 +6,8 @@ from typing import Callable, Iterable
 
 import rospy
 import tf2_ros
-from graph import Inbox, run, wait_until
-from messages import publisher, transform, turn
+from graph import Inbox, publisher, run, wait_until
+from messages import transform, turn
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import CameraInfo, Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32

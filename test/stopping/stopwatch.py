@@ -21,15 +21,13 @@ _FIRST = ("/rosout", "/clock", "/get_loggers", "/set_logger_level")
 
 def seconds_to_stop(launch_file: str, arguments: List[str], log: Path) -> float:
     """Return the seconds from SIGINT until a launch file and all its nodes have ended. Raises AssertionError."""
-    return _seconds_to_stop(["roslaunch", PACKAGE, launch_file, *arguments], _nodes(launch_file, arguments), log)
+    launch = [PACKAGE, launch_file, *arguments]
+    told = subprocess.run(["roslaunch", "--nodes", *launch], stdout=subprocess.PIPE, text=True, check=True).stdout
+    return seconds_of(["roslaunch", *launch], set(told.split()), log)
 
 
-def seconds_to_stop_without_nodes(log: Path) -> float:
-    """Return the seconds from SIGINT until a bare master has ended. Raises AssertionError."""
-    return _seconds_to_stop(["roscore"], {"/rosout"}, log)
-
-
-def _seconds_to_stop(command: List[str], nodes: Set[str], log: Path) -> float:
+def seconds_of(command: List[str], nodes: Set[str], log: Path) -> float:
+    """Return the seconds from SIGINT until a command that starts a master and nodes has ended."""
     port = free_port()
     environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(log.parent)}
     with log.open("wb") as output:
@@ -58,11 +56,6 @@ def free_port() -> int:
     raise AssertionError(f"no free port from {lowest // 2} to {lowest}")
 
 
-def _nodes(launch_file: str, arguments: List[str]) -> Set[str]:
-    command = ["roslaunch", "--nodes", PACKAGE, launch_file, *arguments]
-    return set(subprocess.run(command, stdout=subprocess.PIPE, text=True, check=True).stdout.split())
-
-
 def _wait_for(nodes: Set[str], port: int, launch: "subprocess.Popen[bytes]", log: Path) -> None:
     """Wait until every node has registered something besides its log, which is the first thing that a node does."""
     master = xmlrpc.client.ServerProxy(f"http://localhost:{port}")
@@ -72,13 +65,6 @@ def _wait_for(nodes: Set[str], port: int, launch: "subprocess.Popen[bytes]", log
         assert launch.poll() is None, log.read_text(errors="replace")
         assert time.monotonic() < deadline, f"not there: {nodes - registered}\n{log.read_text(errors='replace')}"
         time.sleep(0.1)
-        registered = _registered(master)
-
-
-def _registered(master: xmlrpc.client.ServerProxy) -> Set[str]:
-    try:
-        _, _, (publishers, subscribers, services) = master.getSystemState("/stopwatch")
-    except OSError:
-        return set()
-    states = [*publishers, *subscribers, *services]
-    return {node for name, nodes in states for node in nodes if node == "/rosout" or not name.endswith(_FIRST)}
+        with suppress(OSError):
+            states = [(name, node) for kind in master.getSystemState("/")[2] for name, those in kind for node in those]
+            registered = {node for name, node in states if node == "/rosout" or not name.endswith(_FIRST)}

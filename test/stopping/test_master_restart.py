@@ -82,9 +82,17 @@ def nodes(master, tmp_path):
         for stamp in (1e9, 1e9 + 0.2):
             log.write(LoggedPing(Reply(ReplyKind.IMX, 20, bytes(252)), stamp))
     arguments = {"play_852": [str(tmp_path / "short.852"), "--loop", "__name:=play_852"]}
-    started = {node: _started(node, arguments.get(node, []), master) for node in NODES}
+    told = {"env": master.environment, "stdout": subprocess.PIPE, "stderr": subprocess.STDOUT, "text": True}
+    started = {
+        node: subprocess.Popen([sys.executable, str(ROOT / "nodes" / node), *arguments.get(node, [])], **told)
+        for node in NODES
+    }
     try:
-        _wait_for_diagnostics(master, started)
+        deadline = time.monotonic() + START_TIMEOUT
+        while not all(master.publishes_diagnostics(node) for node in NODES):
+            assert _ends(started) == dict.fromkeys(NODES)
+            assert time.monotonic() < deadline
+            time.sleep(0.1)
         yield started
     finally:
         for process in started.values():
@@ -92,20 +100,9 @@ def nodes(master, tmp_path):
             process.communicate()
 
 
-def _started(node, arguments, master):
-    command = ["python3", str(ROOT / "nodes" / node), *arguments]
-    return subprocess.Popen(
-        command, env=master.environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
-    )
-
-
-def _wait_for_diagnostics(master, started):
-    deadline = time.monotonic() + START_TIMEOUT
-    while not all(master.publishes_diagnostics(node) for node in NODES):
-        states = {node: process.poll() for node, process in started.items()}
-        assert not any(states.values()), states
-        assert time.monotonic() < deadline, states
-        time.sleep(0.1)
+def _ends(nodes):
+    """Return the exit status of each node, None of those that run."""
+    return {node: process.poll() for node, process in nodes.items()}
 
 
 def test_nodes_outlive_a_master_that_is_away_and_end_when_a_new_one_does_not_know_them(master, nodes):
@@ -113,22 +110,15 @@ def test_nodes_outlive_a_master_that_is_away_and_end_when_a_new_one_does_not_kno
     time.sleep(AWAY)
     master.process.send_signal(signal.SIGCONT)
     time.sleep(AWAY)
-    assert {node: process.poll() for node, process in nodes.items()} == dict.fromkeys(NODES)
-
     master.stop()
     time.sleep(AWAY)
-    assert {node: process.poll() for node, process in nodes.items()} == dict.fromkeys(NODES)
+    assert _ends(nodes) == dict.fromkeys(NODES)
 
     master.start()
     outputs = {node: _last_words(process) for node, process in nodes.items()}
-    ends = {
-        node: (process.returncode, outputs[node].count("the ROS master was restarted"))
-        for node, process in nodes.items()
-    }
-    for node in NODES:
-        if ends[node] != (1, 1):
-            print(node, outputs[node])
-    assert ends == dict.fromkeys(NODES, (1, 1))
+    told = {node: text.count("the ROS master was restarted") for node, text in outputs.items()}
+    assert told == dict.fromkeys(NODES, 1), outputs
+    assert _ends(nodes) == dict.fromkeys(NODES, 1), outputs
 
 
 def _last_words(process):

@@ -1,7 +1,7 @@
 """Ctrl-C ends every launch file within two seconds, however many nodes it has and whatever they are doing."""
 
 import pytest
-from stopwatch import ROOT, seconds_to_stop, seconds_to_stop_without_nodes
+from stopwatch import ROOT, seconds_of, seconds_to_stop
 
 BAG = f"bag:={ROOT / 'test/data/basin.bag'}"
 LIMIT = 2.0
@@ -25,6 +25,6 @@ def test_ctrl_c_ends_it_within_two_seconds(tmp_path, launch_file, arguments):
     given = [f"link:={tmp_path / 'head'}"] if launch_file.startswith("driver") else []
     for _ in range(ATTEMPTS):
         seconds = seconds_to_stop(launch_file, [*arguments, *given], tmp_path / "log")
-        if seconds < LIMIT or seconds < LIMIT * seconds_to_stop_without_nodes(tmp_path / "log") / QUIET:
+        if seconds < LIMIT or seconds < LIMIT * seconds_of(["roscore"], {"/rosout"}, tmp_path / "log") / QUIET:
             return
     pytest.fail(f"{seconds:.1f} s")
