@@ -9,7 +9,6 @@ from programs import ROOT
 
 DOCS = sorted((ROOT / "docs").glob("*.md"))
 PAGES = [ROOT / "README.md", ROOT / "migration" / "README.md", *DOCS]
-PAGES_BY_NAME = {path.relative_to(ROOT).as_posix(): path for path in PAGES}
 CODE_BLOCK = re.compile(r"^(?: {4}[^\n]*|```.*?^```)$", re.MULTILINE | re.DOTALL)
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 HEADING = re.compile(r"^#+ (.+)$", re.MULTILINE)
@@ -30,24 +29,25 @@ def _anchors(text):
     return {heading.replace(" ", "-") for heading in headings}
 
 
-@pytest.mark.parametrize("page", PAGES_BY_NAME)
+@pytest.fixture(params=PAGES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def page(request):
+    """Return the path of a page."""
+    return request.param
+
+
 def test_every_path_that_a_page_names_exists(page):
-    missing = [path for path in _paths_in(PAGES_BY_NAME[page].read_text()) if not list(ROOT.glob(path))]
-    assert missing == []
+    assert [path for path in _paths_in(page.read_text()) if not list(ROOT.glob(path))] == []
 
 
-@pytest.mark.parametrize("page", PAGES_BY_NAME)
 def test_every_link_of_a_page_leads_somewhere(page):
-    path = PAGES_BY_NAME[page]
-    broken = []
-    for link in LINK.findall(CODE_BLOCK.sub("", path.read_text())):
-        file, _, anchor = link.partition("#")
-        target = (path.parent / file).resolve() if file else path
-        if link.startswith(("http://", "https://")):
-            continue
-        if not target.exists() or (anchor and anchor not in _anchors(target.read_text())):
-            broken.append(link)
-    assert broken == []
+    links = [link for link in LINK.findall(CODE_BLOCK.sub("", page.read_text())) if not link.startswith("http")]
+    assert [link for link in links if not _leads_somewhere(page, link)] == []
+
+
+def _leads_somewhere(page, link):
+    file, _, anchor = link.partition("#")
+    target = (page.parent / file).resolve() if file else page
+    return target.exists() and (not anchor or anchor in _anchors(target.read_text()))
 
 
 def test_the_readme_links_to_every_page():
@@ -87,27 +87,22 @@ def test_the_architecture_page_names_only_what_stands_in_the_code():
     assert [name for name in names if not re.search(rf"\b{name}\b", code)] == []
 
 
-@pytest.mark.parametrize("page", PAGES_BY_NAME)
 def test_every_message_that_a_page_explains_stands_in_the_code(page):
     code = "\n".join(path.read_text() for path in (ROOT / "src").rglob("*.py"))
-    parts = [part.strip() for message in _explained_messages(PAGES_BY_NAME[page].read_text()) for part in message]
-    assert [part for part in parts if part not in code] == []
+    parts = [part for message in _explained_messages(page.read_text()) for part in message]
+    assert [part for part in parts if part.strip() not in code] == []
 
 
-@pytest.mark.parametrize("page", PAGES_BY_NAME)
 def test_every_table_of_figures_names_the_command_that_prints_it(page):
-    head, *sections = re.split(r"^(?=#+ )", PAGES_BY_NAME[page].read_text(), flags=re.MULTILINE)[1:]
+    head, *sections = re.split(r"^(?=#+ )", page.read_text(), flags=re.MULTILINE)[1:]
     told = [section for section in (head, *sections) if any(map(_holds_figures, TABLE.findall(section)))]
     named = re.compile(r"scripts/(?:bench|results|soak)\b")
     assert [one.partition("\n")[0] for one in told if not named.search(one) and not named.search(head)] == []
 
 
-@pytest.mark.parametrize("page", PAGES_BY_NAME)
 def test_every_benchmark_that_a_page_names_exists(page):
-    named = re.findall(r"scripts/bench (?:--)?([a-z][\w-]*)", PAGES_BY_NAME[page].read_text())
-    assert {name.replace("-", "_") for name in named} - {
-        name.replace("-", "_") for name in (*SECTIONS, *STUDIES)
-    } == set()
+    named = re.findall(r"scripts/bench (?:--)?([a-z][\w-]*)", page.read_text())
+    assert {name.replace("-", "_") for name in named} <= {name.replace("-", "_") for name in (*SECTIONS, *STUDIES)}
 
 
 def test_every_benchmark_can_be_imported():
