@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from enum import Enum
 from pathlib import Path
-from typing import Callable, List, Mapping, Optional, Tuple
+from typing import Callable, Iterable, List, Mapping, Optional
 from xml.etree import ElementTree as ET
 
 from oldest.environment import HOW_TO_GET_ONE, find_python38
@@ -28,9 +28,10 @@ SPARE_TOGETHER = 3
 SPARE_PRIORITY = 19
 # Rostests that measure processor time; all others wait for what must come, however late.
 MEASURING = ("imagenex_852_load", "ping360_load")
-# Rostests that take longest: those that begin last should be short.
+# Rostests, and files of long tests, that take longest, by their stems: those that begin last should be short.
 LONG = (
-    "one_and_many_processes", "every_node", "vehicle_emulated", "silence", "thrusters_demo", "strafing_demo",
+    "vehicle_emulated", "every_node", "standing_head", "one_and_many_processes", "bad_input", "silence",
+    "test_causes", "test_motion_faults", "test_sonar_faults", "test_map_bag", "test_each", "test_found_after_silence",
 )  # fmt: skip
 # Of pytest: a file's tests share what its fixtures made. Each process first imports everything, which takes seconds:
 # only the steps that take longest do it twice.
@@ -70,11 +71,6 @@ class Step:
     timeout: float = STEP_TIMEOUT
     variables: Mapping[str, str] = field(default_factory=dict)
 
-    @property
-    def prioritised_command(self) -> List[str]:
-        """The command at the priority of its load."""
-        return ["nice", f"-n{SPARE_PRIORITY}", *self.command] if self.load is Load.SPARE else self.command
-
 
 def steps() -> List[Step]:
     """Return all steps, of each load in the order in which they begin: long ones before short ones."""
@@ -94,13 +90,19 @@ def steps() -> List[Step]:
         _pytest("web page", "test/stopping/test_web_page.py", load=Load.SHARED),
         _pytest("installation", "test/installation", load=Load.SHARED),
         _pytest("soak", "test/soak", load=Load.SHARED),
-        *(_rostest(test) for test in sorted((ROOT / "test/rostest").glob("*.test"), key=_by_length)),
+        *(_rostest(test) for test in _longest_first((ROOT / "test/rostest").glob("*.test"))),
     ]
+
+
+def _longest_first(files: Iterable[Path]) -> List[Path]:
+    order = {stem: number for number, stem in enumerate(LONG)}
+    return sorted(files, key=lambda path: (order.get(path.stem, len(LONG)), path.stem))
 
 
 def _long() -> List[str]:
     """Return the files with long tests: to import all others takes seconds."""
-    return [str(path) for path in sorted((ROOT / "test/unit").rglob("test_*.py")) if "mark.long" in path.read_text()]
+    files = (ROOT / "test/unit").rglob("test_*.py")
+    return [str(path) for path in _longest_first(files) if "mark.long" in path.read_text()]
 
 
 def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
@@ -114,10 +116,6 @@ def _damaged_files() -> Step:
     command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "5"]
     variables = {"PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}", "OPENBLAS_NUM_THREADS": "1"}
     return Step("damaged files", command, load=Load.SPARE, timeout=SPARE_TIMEOUT, variables=variables)
-
-
-def _by_length(test: Path) -> Tuple[bool, str]:
-    return test.stem not in LONG, test.stem
 
 
 def _rostest(test: Path) -> Step:
@@ -143,9 +141,10 @@ def run_step(step: Step) -> Outcome:
     """Run a step, print what failed and return its counts."""
     start = time.monotonic()
     environment = {**os.environ, "ROS_TEST_RESULTS_DIR": str(step.report or RESULTS), **step.variables}
+    command = ["nice", f"-n{SPARE_PRIORITY}", *step.command] if step.load is Load.SPARE else step.command
     try:
         done = subprocess.run(
-            step.prioritised_command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
+            command, cwd=str(ROOT), env=environment, stdout=subprocess.PIPE, stderr=subprocess.STDOUT,
             stdin=subprocess.DEVNULL, timeout=step.timeout, check=False,
         )  # fmt: skip
         status, output = done.returncode, done.stdout.decode(errors="replace")
@@ -169,8 +168,8 @@ def _counted(step: Step, status: int) -> Outcome:
     if step.report is None:
         return Outcome(int(status == 0), int(status != 0))
     cases = _cases(step.report)
-    failed = sum(1 for case in cases if case.find("failure") is not None or case.find("error") is not None)
-    skipped = sum(1 for case in cases if case.find("skipped") is not None)
+    failed = sum(bool(case.findall("failure") or case.findall("error")) for case in cases)
+    skipped = sum(bool(case.findall("skipped")) for case in cases)
     passed = len(cases) - failed - skipped
     # A step that broke before, after or without its tests has failed, whatever the tests say.
     return Outcome(passed, max(failed, int(status != 0 or not cases)), skipped)
@@ -195,8 +194,8 @@ def _failure_texts(step: Step) -> List[str]:
 
 
 def _skip_reasons(step: Step) -> List[str]:
-    found = [case.find("skipped") for case in _cases(step.report)] if step.report else []
-    return sorted({_skip_reason(element) for element in found if element is not None})
+    cases = _cases(step.report) if step.report else []
+    return sorted({_skip_reason(element) for case in cases for element in case.findall("skipped")})
 
 
 def _skip_reason(element: ET.Element) -> str:
