@@ -4,13 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from clouds import SECOND, beam_of
+from clouds import SECOND, cloud_of, placed
 from hypothesis import given
 from hypothesis import strategies as st
 
 from node_support.errors import RefusedInput
-from sonar_processing.beams.beam import PlacedBeam
-from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import (
     EchoExtractor,
     EchoExtractorParameters,
@@ -46,9 +44,13 @@ def with_speckle(image, seed, strength=30.0):
 
 def binary_image(starts, lengths):
     """Return (beams, bins) uint8 of strengths 0 and 127: one run per beam."""
-    bin_numbers = np.arange(400)
-    starts, lengths = np.asarray(starts)[:, np.newaxis], np.asarray(lengths)[:, np.newaxis]
-    return np.where((bin_numbers >= starts) & (bin_numbers < starts + lengths), 127, 0).astype(np.uint8)
+    after = np.arange(400) - np.asarray(starts)[:, np.newaxis]
+    return np.where((after >= 0) & (after < np.asarray(lengths)[:, np.newaxis]), 127, 0).astype(np.uint8)
+
+
+def twenty_runs(length):
+    """Return (beams, bins) uint8: strengths of 127 from bin 150 on in the first 20 beams."""
+    return binary_image([150] * BEAMS, np.where(np.arange(BEAMS) < 20, length, 0))
 
 
 PEAKS = {"mode": "MATCHED_FILTER", "pulse_sigma": 0.15}
@@ -60,9 +62,8 @@ STRONG_ONLY = {"threshold_share": 1.0, "min_height": 10.0}
 def test_a_wall_ahead_in_a_narrow_sector_is_no_ring():
     """It is heard at about one range in all directions, which in a whole turn is an echo of the floor."""
     ahead = wall_image(np.full(20, 150.0))
-    found, _ = extract_echoes(ahead, RESOLUTION, EchoExtractorParameters(**PEAKS), is_narrow=True)
-    assert len(found.bins) == 20
-    assert len(extract_echoes(ahead, RESOLUTION, EchoExtractorParameters(**PEAKS))[0].bins) == 0
+    for is_narrow, echoes in ((True, 20), (False, 0)):
+        assert len(extract_echoes(ahead, RESOLUTION, EchoExtractorParameters(**PEAKS), is_narrow)[0]) == echoes
 
 
 def _echoes(image, **values):
@@ -108,10 +109,8 @@ def test_a_wall_inside_the_ring_is_still_found():
 
 
 def test_heights_are_what_stands_out_of_the_ring():
-    runs = binary_image([150] * 20 + [0] * 40, [40] * 20 + [0] * 40).astype(np.float32)
-    image = with_ring(runs, at=100, width=200, strength=50.0)
-    echoes = _echoes(image)
-    np.testing.assert_allclose(echoes.heights, 127.0, atol=0.1)
+    image = with_ring(twenty_runs(40).astype(np.float32), at=100, width=200, strength=50.0)
+    np.testing.assert_allclose(_echoes(image).heights, 127.0, atol=0.1)
 
 
 def test_nothing_nearer_than_min_range_is_an_echo():
@@ -170,7 +169,7 @@ def test_the_leading_edge_lies_before_the_peak_by_as_much_whatever_the_strength(
 
 
 def test_peaks_of_one_echo_have_one_leading_edge():
-    image = binary_image([150] * 20 + [0] * 40, [60] * 20 + [0] * 40).astype(np.float32)
+    image = twenty_runs(60).astype(np.float32)
     image[:20, 180:184] -= 30.0
     assert len(_echoes(image)) == 40
     assert len(_echoes(image, mode="LEADING_EDGE")) == 20
@@ -178,7 +177,7 @@ def test_peaks_of_one_echo_have_one_leading_edge():
 
 @pytest.mark.parametrize(("spacing", "per_run"), [(0.1, 28), (0.5, 6), (2.8, 1), (50.0, 1)])
 def test_dense_points_stand_all_along_a_run(spacing, per_run):
-    echoes = _echoes(binary_image([150] * 20 + [0] * 40, [28] * 20 + [0] * 40), mode="DENSE", spacing=spacing)
+    echoes = _echoes(twenty_runs(28), mode="DENSE", spacing=spacing)
     assert np.bincount(echoes.beams).tolist() == [per_run] * 20
     assert (echoes.bins.min(), echoes.bins.max() <= 177) == (150, True)
 
@@ -227,19 +226,24 @@ def test_the_threshold_is_never_above_half_of_the_highest():
 
 def _polar_cloud(image, *, moving_by=0.0, **values):
     """Return the organised cloud of a turn of a vehicle that moves along +x by `moving_by` m per beam."""
-    beams = []
-    for number, strengths in enumerate(np.clip(image, 0, 255).astype(np.uint8)):
-        pose = np.eye(4)
-        pose[0, 3] = moving_by * number
-        angle = 2 * np.pi * number / len(image)
-        beam = beam_of(strengths, angle=angle, resolution=RESOLUTION, seconds=number + 1)
-        beams.append(PlacedBeam(beam, pose, is_moving=moving_by > 0))
+    beams = [
+        placed(
+            strengths=strengths, angle=2 * np.pi * number / len(image), resolution=RESOLUTION, seconds=number + 1,
+            shift=(moving_by * number, 0.0, 0.0), moving=moving_by > 0,
+        )
+        for number, strengths in enumerate(np.clip(image, 0, 255).astype(np.uint8))
+    ]  # fmt: skip
     return PolarScan.of(beams).cloud(SonarToCloudParameters(**{"min_range": 0.0, **values}))
 
 
+@pytest.fixture
+def extractor():
+    return EchoExtractor(EchoExtractorParameters())
+
+
 @pytest.mark.parametrize("moving_by", [0.0, 0.03])
-def test_the_stage_places_every_echo_by_the_pose_of_its_beam(moving_by):
-    cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), moving_by=moving_by))
+def test_the_stage_places_every_echo_by_the_pose_of_its_beam(extractor, moving_by):
+    cloud = extractor(_polar_cloud(wall_image(WALL), moving_by=moving_by))
     angles, ranges = 2 * np.pi * np.arange(BEAMS) / BEAMS, (WALL + 0.5) * RESOLUTION
     expected = np.column_stack([ranges * np.cos(angles) + moving_by * np.arange(BEAMS), ranges * np.sin(angles)])
     np.testing.assert_allclose(cloud.points[:, :2], expected, atol=0.01)
@@ -256,34 +260,30 @@ def test_the_stage_finds_the_same_echoes_wherever_the_sonar_is(shift):
     np.testing.assert_allclose(of_moved.points[:, 3], echoes.points[:, 3], rtol=1e-3)
 
 
-def test_the_stage_gives_every_echo_the_stamp_of_its_beam():
-    cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), moving_by=0.01))
+def test_the_stage_gives_every_echo_the_stamp_of_its_beam(extractor):
+    cloud = extractor(_polar_cloud(wall_image(WALL), moving_by=0.01))
     np.testing.assert_allclose(cloud.time_stamps, np.arange(1, BEAMS + 1))
     assert (cloud.stamp_ns, cloud.frame_id, cloud.height) == (BEAMS * SECOND, "odom", 1)
 
 
-def test_the_stage_hears_nothing_in_removed_bins():
-    cloud = EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), min_range=17.0))
+def test_the_stage_hears_nothing_in_removed_bins(extractor):
+    cloud = extractor(_polar_cloud(wall_image(WALL), min_range=17.0))
     assert 0 < len(cloud) < BEAMS
     assert np.isfinite(cloud.points).all()
     assert np.hypot(*cloud.points[:, :2].T).min() > 16.9
 
 
-def test_the_stage_tells_its_threshold():
-    extractor = EchoExtractor(EchoExtractorParameters())
+def test_the_stage_tells_its_threshold(extractor):
     assert extractor.newest_threshold is None
     extractor(_polar_cloud(wall_image(WALL)))
     assert 2.0 <= extractor.newest_threshold < 127.0
 
 
-def test_a_cloud_without_rows_is_refused():
+def test_a_cloud_without_rows_or_of_removed_points_only_is_refused(extractor):
     with pytest.raises(RefusedInput, match="not organised"):
-        EchoExtractor(EchoExtractorParameters())(Cloud(np.zeros((3, 4), np.float32), np.ones(3), 1, "odom"))
-
-
-def test_a_cloud_of_removed_points_only_is_refused():
+        extractor(cloud_of([1, 2, 3]))
     with pytest.raises(RefusedInput, match="no two neighbouring bins"):
-        EchoExtractor(EchoExtractorParameters())(_polar_cloud(wall_image(WALL), min_range=90.0))
+        extractor(_polar_cloud(wall_image(WALL), min_range=90.0))
 
 
 def _stamped(image, seconds):

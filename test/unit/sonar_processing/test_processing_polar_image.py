@@ -50,18 +50,13 @@ def test_a_turn_fills_the_whole_disc(start, beams, direction):
     assert (image[~inside] == 0).all()
 
 
-def test_the_newest_beam_replaces_the_one_before():
+def test_the_newest_beam_replaces_the_one_before_and_one_of_another_range_begins_a_new_picture():
     picture = PolarImage(SonarImageParameters(metres_per_pixel=1.0))
     picture.draw(beam_of(np.full(BINS, 200)))
     assert picture.draw(beam_of(np.full(BINS, 50)))[20, 50] == 50
-
-
-def test_beams_of_another_range_begin_a_new_picture():
-    picture = PolarImage(SonarImageParameters(metres_per_pixel=1.0))
-    picture.draw(beam_of(np.full(BINS, 200)))
-    image = picture.draw(beam_of(np.full(2 * BINS, 50), angle=math.pi))
+    image = picture.draw(beam_of(np.full(2 * BINS, 60), angle=math.pi))
     assert image.shape == (201, 201)
-    assert set(np.unique(image)) == {0, 50}
+    assert set(np.unique(image)) == {0, 60}
 
 
 def test_without_a_size_of_pixels_the_range_fits_into_501():

@@ -1,6 +1,7 @@
 """Walls and circles in scans, which echoes stand alone, and markers that fit a tank as well as a marina."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -126,17 +127,10 @@ def test_noise_of_single_bins_beside_a_wall_is_no_second_wall():
     assert len(_lines(_cloud(np.concatenate([wall, noise]), stamps))) == 1
 
 
-@pytest.mark.parametrize("count", [0, 1, 2, 5])
-def test_clouds_of_few_points_have_neither_walls_nor_circles(count):
-    cloud = _cloud(np.arange(2.0 * count).reshape(count, 2) * 5.0)
-    assert _lines(cloud) == []
-    assert _circles(cloud) == []
-
-
-def test_points_in_one_place_are_no_shape():
-    cloud = _cloud(np.ones((50, 2)))
-    assert _lines(cloud) == []
-    assert _circles(cloud) == []
+@pytest.mark.parametrize("xy", [*(5.0 * np.arange(10.0).reshape(5, 2)[:n] for n in (0, 1, 2, 5)), np.ones((50, 2))])
+def test_few_points_and_points_in_one_place_are_neither_walls_nor_circles(xy):
+    assert _lines(_cloud(xy)) == []
+    assert _circles(_cloud(xy)) == []
 
 
 def test_when_the_points_left_are_one_wall_the_search_ends():
@@ -174,19 +168,14 @@ def test_radii_in_the_wrong_order_are_refused():
         CircleDetectorParameters(min_radius=0.7)
 
 
-def _wall_seen_by_a_turning_sonar(step, beams, distance=8.0):
-    """Return the echoes of a wall at y = `distance` heard by a sonar at the origin, in the order of the beams."""
-    bearings = step * np.arange(beams)
-    hits = np.sin(bearings) > 0.2
-    return distance / np.tan(bearings[hits]), np.flatnonzero(hits), distance
-
-
 @pytest.mark.parametrize("distance", [8.0, 20.0])
 @pytest.mark.parametrize("step_deg", [2.2, 3.0, 3.8])
 def test_a_wall_seen_twice_while_the_vehicle_turns_is_no_row_of_circles(step_deg, distance):
-    x, beams, y = _wall_seen_by_a_turning_sonar(math.radians(step_deg), 150, distance)
-    noise = np.random.default_rng(0).normal(0.0, 0.05, len(x))
-    assert _circles(_cloud(np.column_stack([x, y + noise]), stamps=1.0 + beams)) == []
+    bearings = math.radians(step_deg) * np.arange(150)
+    beams = np.flatnonzero(np.sin(bearings) > 0.2)
+    noise = np.random.default_rng(0).normal(0.0, 0.05, len(beams))
+    wall = np.column_stack([distance / np.tan(bearings[beams]), distance + noise])
+    assert _circles(_cloud(wall, stamps=1.0 + beams)) == []
 
 
 def test_a_near_piece_of_a_wall_is_no_circle_because_a_line_fits_it_better():
@@ -210,25 +199,21 @@ def _seen(ranges, weights=None, lengths=None):
     return Sightings(points, np.zeros((count, 2)), np.arange(count), weights, lengths, STEP)
 
 
-def _of(seen, *chosen):
-    return seen.only(np.array(chosen))
-
-
 def test_a_thing_far_from_all_echoes_is_alone():
     seen = _seen([10.0, 10.0, 14.0])
-    assert is_alone(_of(seen, 0, 1), _of(seen, 2), NOTHING, clearance=0.7)
+    assert is_alone(seen.only([0, 1]), seen.only([2]), NOTHING, clearance=0.7)
 
 
 @pytest.mark.parametrize("clearance", [0.1, 1.0])
 def test_an_echo_within_the_clearance_or_in_the_next_beam_is_company(clearance):
     seen = _seen([10.0, 10.0, 10.1])
-    assert not is_alone(_of(seen, 0, 1), _of(seen, 2), NOTHING, clearance)
+    assert not is_alone(seen.only([0, 1]), seen.only([2]), NOTHING, clearance)
 
 
 @pytest.mark.parametrize(("weight", "expected"), [(2, True), (3, False)])
 def test_a_faint_echo_in_the_next_beam_is_company_where_it_is_half_as_strong(weight, expected):
     seen = _seen([10.0, 10.0, 10.1], weights=[6, 4, weight])
-    assert is_alone(_of(seen, 0, 1), NOTHING, _of(seen, 2), clearance=0.7) == expected
+    assert is_alone(seen.only([0, 1]), NOTHING, seen.only([2]), clearance=0.7) == expected
 
 
 @pytest.mark.parametrize(("farther", "expected"), [(0.0, False), (0.2, False), (0.5, True), (-0.5, True)])
@@ -237,13 +222,7 @@ def test_two_echoes_of_a_wall_met_at_more_than_35_degrees_are_oblique(farther, e
 
 
 def test_one_beam_that_meets_a_thing_twice_is_not_oblique():
-    twice = _seen([10.0, 10.2])
-    twice = Sightings(np.array([[10.0, 0.0], [10.2, 0.0]]), twice.origins, *_parts(twice))
-    assert not is_oblique(twice)
-
-
-def _parts(seen):
-    return seen.beams, seen.weights, seen.lengths, seen.step
+    assert not is_oblique(replace(_seen([10.0, 10.2]), points=np.array([[10.0, 0.0], [10.2, 0.0]])))
 
 
 @pytest.mark.parametrize(("length", "expected"), [(0.3, False), (1.0, True)])
@@ -262,13 +241,11 @@ def test_the_footprint_is_what_two_neighbouring_beams_cover():
 
 
 def test_beams_that_heard_nothing_are_counted():
-    bearings = math.radians(3.0) * np.array([0, 1, 2, 3, 9, 10])
-    points = np.zeros((6, 4), dtype=np.float32)
-    points[:, 0], points[:, 1], points[:, 3] = np.cos(bearings) * 10.0, np.sin(bearings) * 10.0, 100.0
-    stamps = 100.0 + 0.133 * np.array([0, 1, 2, 3, 9, 10])
-    echoes = beam_echoes(Cloud(points, stamps, 10**9, "odom"), gap=0.5)
-    seen = sightings(echoes, np.arange(6), np.zeros((6, 2)))
-    assert seen.beams.tolist() == [0, 1, 2, 3, 9, 10]
+    beams = np.array([0, 1, 2, 3, 9, 10])
+    bearings = math.radians(3.0) * beams
+    cloud = _cloud(10.0 * np.column_stack([np.cos(bearings), np.sin(bearings)]), stamps=100.0 + 0.133 * beams)
+    seen = sightings(beam_echoes(cloud, gap=0.5), np.arange(6), np.zeros((6, 2)))
+    assert seen.beams.tolist() == beams.tolist()
     assert seen.step == pytest.approx(math.radians(3.0), abs=1e-6)
 
 
@@ -278,20 +255,17 @@ def _walls(size, *offsets):
     return Walls(walls=[Wall(start=start, end=end, sonar_distance=abs(start.y)) for start, end in ends])
 
 
-def _texts(walls):
-    return [marker for marker in wall_markers(walls).markers if marker.type == Marker.TEXT_VIEW_FACING]
+def _markers(kind, walls):
+    return [marker for marker in wall_markers(walls).markers if marker.type == kind]
 
 
 @pytest.mark.parametrize(("size", "height"), [(8.0, 0.5), (40.0, 2.5), (200.0, 2.5)])
 def test_texts_are_as_large_as_the_scan_allows(size, height):
-    (text,) = _texts(_walls(size, 3.0))
+    (text,) = _markers(Marker.TEXT_VIEW_FACING, _walls(size, 3.0))
     assert text.scale.z == pytest.approx(height)
 
 
-def test_a_distance_that_would_lie_on_another_is_left_out():
-    assert [text.text for text in _texts(_walls(8.0, 4.0, 4.3, -4.0))] == ["4.0 m", "4.0 m"]
-
-
-def test_every_wall_has_its_line():
-    lines = [one for one in wall_markers(_walls(8.0, 4.0, 4.3)).markers if one.type == Marker.LINE_STRIP]
-    assert len(lines) == 2
+def test_every_wall_has_its_line_and_a_distance_that_would_lie_on_another_is_left_out():
+    walls = _walls(8.0, 4.0, 4.3, -4.0)
+    assert len(_markers(Marker.LINE_STRIP, walls)) == 3
+    assert [text.text for text in _markers(Marker.TEXT_VIEW_FACING, walls)] == ["4.0 m", "4.0 m"]
