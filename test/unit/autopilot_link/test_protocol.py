@@ -131,29 +131,26 @@ def test_answers_to_others_and_late_ones_tell_nothing():
         _asked(clock, 0, 0, SECOND, SECOND)
 
 
-def _corrections(*steps):
-    """Return what is sent, x [m], and the jumps counted, after each (stamp [s], tf's correction x, fix or None)."""
-    corrections, sent = Corrections(), []
-    for stamp, by_tf, fix in steps:
+@pytest.mark.parametrize(
+    ("steps", "sent"),
+    [
+        (
+            [(0, 0.0, None), (1, 1.0, 5.0), (2, 3.0, None), (3, 4.9, None), (4, 5.0, None)],
+            [(0.0, 0), (5.0, 1), (5.0, 1), (4.9, 1), (5.0, 1)],
+        ),
+        ([(0, 0.0, None), (1, 0.1, 0.4), (2, 0.4, None)], [(0.0, 0), (0.4, 0), (0.4, 0)]),
+        ([(0, 0.0, None), (1, 0.0, 9.0), (7, 0.0, None)], [(0.0, 0), (9.0, 1), (0.0, 2)]),
+    ],
+    ids=["far away: one jump though tf glides to it", "nearby: no jump", "tf never comes to it: forgotten"],
+)
+def test_a_fix_is_sent_at_once_and_counts_as_a_jump_where_it_is_far_away(steps, sent):
+    """Steps are (stamp [s], tf's correction x [m], that of a fix or None), what is sent x [m] and the jumps so far."""
+    corrections = Corrections()
+    for (stamp, by_tf, fix), expected in zip(steps, sent):
         if fix is not None:
             corrections.take_fix(stamp * SECOND, matrices(np.array([fix, 0.0, 0.0])))
         pose = corrections.corrected(stamp * SECOND, matrices(np.array([by_tf, 0.0, 0.0])), np.eye(4), PARAMETERS)
-        sent.append((pose[0, 3], corrections.jumps))
-    return sent
-
-
-def test_a_fix_far_away_is_one_jump_though_tf_glides_to_it():
-    assert _corrections((0, 0.0, None), (1, 1.0, 5.0), (2, 3.0, None), (3, 4.9, None), (4, 5.0, None)) == [
-        (0.0, 0), (5.0, 1), (5.0, 1), (4.9, 1), (5.0, 1),
-    ]  # fmt: skip
-
-
-def test_a_fix_nearby_is_no_jump():
-    assert [jumps for _, jumps in _corrections((0, 0.0, None), (1, 0.1, 0.4), (2, 0.4, None))] == [0, 0, 0]
-
-
-def test_a_fix_that_tf_never_comes_to_is_forgotten():
-    assert _corrections((0, 0.0, None), (1, 0.0, 9.0), (7, 0.0, None)) == [(0.0, 0), (9.0, 1), (0.0, 2)]
+        assert (pose[0, 3], corrections.jumps) == expected
 
 
 def test_a_turn_is_a_jump_too():

@@ -55,15 +55,12 @@ def test_a_steady_turn_is_a_circle_even_where_headings_are_few(reckoner):
     assert done.turn_rate == pytest.approx(rate)
 
 
-def test_the_orientation_is_the_one_that_was_measured(reckoner):
+def test_the_orientation_is_the_one_that_was_measured_and_depth_is_downward(reckoner):
     rotation = heading(2.0, roll=0.2, pitch=-0.3)
+    reckoner.take_depth(7.5)
     done = reckoner.take_orientation(START, rotation)
     np.testing.assert_allclose(done.T_odom_base[:3, :3], rotation)
-
-
-def test_depth_is_downward(reckoner):
-    reckoner.take_depth(7.5)
-    assert reckoner.take_orientation(START, np.eye(3)).T_odom_base[2, 3] == -7.5
+    assert done.T_odom_base[2, 3] == -7.5
 
 
 def test_a_new_velocity_does_not_move_the_vehicle_at_once(reckoner):
@@ -94,7 +91,7 @@ def test_an_estimate_that_is_not_followed_by_another_fades(reckoner):
 
 def test_a_measured_velocity_tilts_with_the_vehicle():
     reckoner = DeadReckoner(DeadReckoningParameters(velocity_source=VelocitySource.MEASURED))
-    nose_down = pose_matrix((0, 0, 0), (0, 0.5, 1.0))[:3, :3]
+    nose_down = heading(1.0, pitch=0.5)
     reckoner.take_velocity(START, nose_down.T @ np.array([0.3, 0.4, 0.0]))
     for second in (0, 2):
         done = reckoner.take_orientation(START + second * SECOND, nose_down)
@@ -139,16 +136,12 @@ def test_the_vehicle_starts_anew_when_time_jumps_back(reckoner):
     assert yaw_of(done.T_odom_base) == pytest.approx(1.0)
 
 
-@pytest.mark.parametrize("velocity", [(np.nan, 0, 0), (np.inf, 0, 0), (0, 1e9, 0)])
-def test_a_velocity_that_no_vehicle_has_is_refused(reckoner, velocity):
+@pytest.mark.parametrize("value", [np.nan, np.inf, -np.inf, 1e5])
+def test_a_velocity_that_no_vehicle_and_a_depth_that_no_sea_has_are_refused(reckoner, value):
     with pytest.raises(RefusedInput, match="must be finite and at most 20 m/s"):
-        reckoner.take_velocity(START, np.array(velocity))
-
-
-@pytest.mark.parametrize("depth", [np.nan, -np.inf, 1e5])
-def test_a_depth_that_no_sea_has_is_refused(reckoner, depth):
+        reckoner.take_velocity(START, np.array([0.0, value, 0.0]))
     with pytest.raises(RefusedInput, match="must be finite and at most 11000 m"):
-        reckoner.take_depth(depth)
+        reckoner.take_depth(value)
 
 
 def test_ten_metres_of_fresh_water_weigh_about_one_atmosphere():
@@ -173,12 +166,9 @@ def test_left_stays_left():
     np.testing.assert_allclose(rotation_of_heading(0.0, HeadingType.COMPASS_DEGREES) @ left, -EAST, atol=1e-12)
 
 
-@pytest.mark.parametrize("heading", [np.nan, np.inf, -np.inf, 721.0])
-def test_what_is_no_heading_is_refused_with_its_value(heading):
-    with pytest.raises(RefusedInput, match=f"{heading} deg"):
-        rotation_of_heading(heading, HeadingType.COMPASS_DEGREES)
-
-
-def test_degrees_that_are_taken_for_radians_are_refused():
-    with pytest.raises(RefusedInput, match=r"200.0 rad, must be .* see heading_type"):
-        rotation_of_heading(200.0, HeadingType.COMPASS_RADIANS)
+@pytest.mark.parametrize(
+    ("heading", "unit"), [*((one, "DEGREES") for one in (np.nan, np.inf, -np.inf, 721.0)), (200.0, "RADIANS")]
+)
+def test_what_is_no_heading_and_degrees_that_are_taken_for_radians_are_refused(heading, unit):
+    with pytest.raises(RefusedInput, match=f"{heading} {unit[:3].lower()}, must be .* see heading_type"):
+        rotation_of_heading(heading, HeadingType[f"COMPASS_{unit}"])

@@ -25,14 +25,10 @@ def stage():
     return _Stage()
 
 
-def test_the_first_problem_is_warned_of_at_once(stage):
-    stage.problems_at(0.0)
-    assert stage.warnings == ["thresholder: 1 beams refused (1 in all): at 0"]
-
-
-def test_more_of_a_kind_are_kept_for_one_warning_that_says_how_many(stage):
+def test_the_first_problem_is_warned_of_at_once_and_more_of_its_kind_in_one_warning_that_says_how_many(stage):
     stage.problems_at(0.0, 1.0, 2.0, WARNING_PERIOD - 0.1, WARNING_PERIOD)
-    assert stage.warnings[1:] == ["thresholder: 4 beams refused (5 in all): at 10"]
+    first, second = "1 beams refused (1 in all): at 0", "4 beams refused (5 in all): at 10"
+    assert stage.warnings == [f"thresholder: {first}", f"thresholder: {second}"]
 
 
 def test_a_flood_is_warned_of_more_and_more_seldom_until_once_a_minute(stage):
@@ -75,20 +71,12 @@ def test_an_old_problem_shows_in_its_total_only(stage):
 
 
 def test_counters_are_totals_and_rates_those_since_the_previous_report(stage):
-    def told():
+    for number, seconds, total, rate in [(10, 2.0, "10", "5.00"), (3, 4.0, "13", "0.75"), (0, 1.0, "13", "0.00")]:
+        stage.health.count("beams in", number)
+        stage.now += seconds
         values = stage.health.report().values
-        return values["beams in"], values["beams in per second"]
-
-    stage.health.count("beams in", 10)
-    stage.now += 2.0
-    assert told() == ("10", "5.00")
-    stage.health.count("beams in", 3)
-    stage.now += 4.0
-    assert told() == ("13", "0.75")
-    stage.now += 1.0
-    assert told() == ("13", "0.00")
-    # A report at the same moment.
-    assert told()[0] == "13"
+        assert (values["beams in"], values["beams in per second"]) == (total, rate)
+    assert stage.health.report().values["beams in"] == "13"  # at the same moment
 
 
 def test_values_are_reported_as_they_are_and_the_newest_wins(stage):
@@ -136,18 +124,6 @@ def test_a_problem_that_somebody_waits_to_hear_of_is_warned_of_each_time(stage):
     assert stage.health.report().values["changes of parameters refused"] == "2"
 
 
-def silent(stage, *, came, now, expected=False):
-    """Return level and text at `now` [s] of a stage whose input came at times `came`."""
-    stage.now = 0.0
-    if expected:
-        stage.health.expect("/heading")
-    for stage.now in came:
-        stage.health.heard("/heading")
-    stage.now = now
-    report = stage.health.report()
-    return report.level, report.text
-
-
 @pytest.mark.parametrize(
     ("came", "now", "expected", "seconds"),
     [
@@ -161,8 +137,15 @@ def silent(stage, *, came, now, expected=False):
     ],
 )
 def test_an_input_that_ceased_is_named_with_its_topic(stage, came, now, expected, seconds):
+    stage.now = 0.0
+    if expected:
+        stage.health.expect("/heading")
+    for stage.now in came:
+        stage.health.heard("/heading")
+    stage.now = now
+    report = stage.health.report()
     told = (Level.OK, "running") if seconds is None else (Level.WARN, f"nothing on /heading for {seconds} s")
-    assert silent(stage, came=came, now=now, expected=expected) == told
+    assert (report.level, report.text) == told
 
 
 def test_an_input_that_never_came_is_warned_of_each_time_that_the_silence_doubled(stage):

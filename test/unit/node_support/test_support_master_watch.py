@@ -2,6 +2,7 @@
 
 import socket
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -19,14 +20,11 @@ def test_a_master_that_is_killed_while_it_answers_counts_as_away(monkeypatch, an
 
 
 def _answer_all(server, answer):
-    while True:
-        try:
-            connection, _ = server.accept()
-        except OSError:
-            return
-        with connection:
-            connection.recv(4096)
-            connection.sendall(answer)
+    with suppress(OSError):
+        while True:
+            with server.accept()[0] as connection:
+                connection.recv(4096)
+                connection.sendall(answer)
 
 
 def test_a_master_that_never_answers_counts_as_away(monkeypatch):

@@ -175,41 +175,38 @@ def test_waiting_ends_with_what_is_in_the_way(tf):
     assert tf.buffer.wait_for("odom", "base_link", int(CLOCK * SECOND), patience=60.0) == ""
 
 
-@pytest.fixture
-def warnings():
-    return []
+class Servo:
+    """The angle of a joint, what was told of it, and what hands it messages."""
+
+    def __init__(self, monkeypatch):
+        monkeypatch.setattr(rospy, "Subscriber", lambda topic, kind, take, **_: setattr(self, "take", take))
+        self.warnings, self.angles = [], []
+        self.joint = JointAngle("servo", Health("test", self.warnings.append), self.angles.append)
+
+    def send(self, **angles):
+        self.take(JointState(name=list(angles), position=list(angles.values())))
 
 
 @pytest.fixture
-def servo(warnings, monkeypatch):
-    """Return a JointAngle and what hands it messages."""
-    callbacks = []
-    monkeypatch.setattr(rospy, "Subscriber", lambda topic, kind, callback, **_: callbacks.append(callback))
-    angles = []
-    joint = JointAngle("servo", Health("test", warnings.append), angles.append)
-    return joint, callbacks[0], angles
+def servo(monkeypatch):
+    return Servo(monkeypatch)
 
 
 def test_the_newest_angle_of_the_joint_is_told(servo):
-    joint, take, angles = servo
-    take(JointState(name=["other", "servo"], position=[0.1, 0.2]))
-    take(JointState(name=["other"], position=[0.3]))
-    assert (joint.for_beam(), angles) == (0.2, [0.2])
+    servo.send(other=0.1, servo=0.2)
+    servo.send(other=0.3)
+    assert (servo.joint.for_beam(), servo.angles, servo.warnings) == (0.2, [0.2], [])
 
 
-def test_an_angle_that_is_not_finite_is_refused(servo, warnings):
-    joint, take, angles = servo
-    take(JointState(name=["servo"], position=[0.2]))
-    take(JointState(name=["servo"], position=[math.nan]))
-    assert (joint.for_beam(), angles) == (0.2, [0.2])
-    assert "joint states refused" in warnings[0]
+def test_an_angle_that_is_not_finite_is_refused(servo):
+    servo.send(servo=0.2)
+    servo.send(servo=math.nan)
+    assert (servo.joint.for_beam(), servo.angles) == (0.2, [0.2])
+    assert "joint states refused" in servo.warnings[0]
 
 
-def test_beams_before_the_first_angle_are_counted(servo, warnings):
-    assert servo[0].for_beam() == 0.0
-    assert "beams of unknown tilt" in warnings[0]
-
-
-def test_without_a_joint_nothing_is_missed(warnings):
-    assert JointAngle("", Health("test", warnings.append)).for_beam() == 0.0
-    assert warnings == []
+def test_beams_before_the_first_angle_are_counted_but_not_without_a_joint(servo):
+    assert JointAngle("", servo.joint._health).for_beam() == 0.0
+    assert servo.warnings == []
+    assert servo.joint.for_beam() == 0.0
+    assert "beams of unknown tilt" in servo.warnings[0]
