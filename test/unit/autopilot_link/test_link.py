@@ -29,7 +29,7 @@ SENT = {"ODOMETRY", "VISION_POSITION_ESTIMATE", "TIMESYNC"}
 
 @pytest.fixture
 def opened(monkeypatch):
-    """Return a function that opens a link and its peers; all are closed at the end."""
+    """Return a function that opens a link, which is ready where it has peers; all are closed at the end."""
     monkeypatch.setattr(link_module, "_QUESTION_PERIOD", 0.05)
     open_ones = []
 
@@ -40,6 +40,7 @@ def opened(monkeypatch):
         open_ones.append(link)
         made = [Peer(link.name, **peer) for peer in peers]
         open_ones.extend(made)
+        wait_until(lambda: not (peers and link.obstacle()))
         return (link, health, messages, *made)
 
     yield make
@@ -57,7 +58,6 @@ def _sent(link, peer, kind="ODOMETRY", pose=POSE):
 
 def test_a_position_arrives_in_the_autopilots_axes_and_time(opened):
     link, _, _, peer = opened({})
-    wait_until(lambda: not link.obstacle())
     stamp = time.monotonic_ns()
     got = _sent(link, peer, pose=replace(POSE, stamp_ns=stamp))
     np.testing.assert_allclose([got.x, got.y, got.z, *got.q], [2.0, 1.0, 3.0, 1.0, 0.0, 0.0, 0.0], atol=1e-6)
@@ -69,10 +69,8 @@ def test_a_position_arrives_in_the_autopilots_axes_and_time(opened):
 
 def test_other_firmware_and_the_other_message(opened):
     link, _, _, peer = opened({"firmware": mavlink.MAV_AUTOPILOT_PX4})
-    wait_until(lambda: not link.obstacle())
     assert _sent(link, peer).frame_id == mavlink.MAV_FRAME_LOCAL_NED
     link, _, _, peer = opened({}, message=PoseMessage.VISION_POSITION_ESTIMATE)
-    wait_until(lambda: not link.obstacle())
     got = _sent(link, peer, "VISION_POSITION_ESTIMATE")
     np.testing.assert_allclose([got.x, got.y, got.z, got.roll, got.yaw], [2.0, 1.0, 3.0, 0.0, 0.0], atol=1e-6)
 
@@ -86,7 +84,6 @@ def test_nothing_is_sent_before_an_autopilot_is_heard_and_tells_its_time(opened)
 
 def test_nothing_but_positions_and_times_is_ever_sent(opened):
     link, _, _, peer = opened({})
-    wait_until(lambda: not link.obstacle())
     for message in (
         mavlink.MAVLink_command_long_message(1, 197, mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 0, 1, 0, 0, 0, 0, 0, 0),
         mavlink.MAVLink_param_request_list_message(1, 197),
@@ -105,7 +102,6 @@ def test_nothing_but_positions_and_times_is_ever_sent(opened):
 
 def test_of_two_autopilots_on_one_link_only_the_chosen_one_gets_positions_and_is_read(opened):
     link, _, messages, first, second = opened({"system": 1}, {"system": 2}, system=2)
-    wait_until(lambda: not link.obstacle())
     for peer in (first, second):
         peer.send(mavlink.MAVLink_attitude_message(peer.now_ns() // 10**6, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0))
     _sent(link, second)
@@ -116,7 +112,6 @@ def test_of_two_autopilots_on_one_link_only_the_chosen_one_gets_positions_and_is
 
 def test_a_second_autopilot_is_told_where_none_was_chosen(opened):
     link, health, _, _ = opened({"system": 1})
-    wait_until(lambda: not link.obstacle())
     other = Peer(link.name, system=2)
     wait_until(lambda: "heartbeats of other autopilots" in health.report().values)
     other.close()
@@ -126,7 +121,6 @@ def test_a_second_autopilot_is_told_where_none_was_chosen(opened):
 def test_a_lost_autopilot_is_told_and_comes_back_with_its_new_clock(opened, monkeypatch):
     monkeypatch.setattr(link_module, "LINK_LOST", 0.5)
     link, _, _, peer = opened({})
-    wait_until(lambda: not link.obstacle())
     peer.close()
     wait_until(lambda: "nothing of the autopilot" in link.obstacle())
     again = Peer(link.name, ahead_ns=-AHEAD_NS)

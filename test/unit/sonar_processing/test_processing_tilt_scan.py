@@ -38,26 +38,24 @@ class Rig:
         return [round(math.degrees(command)) for command in self.commands]
 
 
-def _count(counter, angles_deg):
-    """Return after which beam the scan was complete, None when it never was."""
-    return next((n for n, angle in enumerate(angles_deg, 1) if counter.add(math.radians(angle))), None)
-
-
-def test_a_full_turn_ends_before_the_head_passes_its_start():
-    assert _count(SweepCounter(), range(90, 800, 3)) == 120
-
-
-def test_a_sector_ends_when_the_head_has_been_at_both_ends():
-    there_and_back = [*range(0, 46, 3), *range(42, -46, -3), *range(-42, 0, 3)]
-    assert _count(SweepCounter(), there_and_back) == 16 + 30 + 1
-
-
-def test_a_number_of_beams_ends_a_scan_whatever_the_head_does():
-    assert _count(SweepCounter(5), [0.0] * 9) == 5
-
-
-def test_a_head_that_stands_still_never_ends_a_turn():
-    assert _count(SweepCounter(), [10.0] * 1000) is None
+@pytest.mark.parametrize(
+    ("scan_beams", "angles_deg", "last"),
+    [
+        (0, range(90, 800, 3), 120),
+        (0, [*range(0, 46, 3), *range(42, -46, -3), *range(-42, 0, 3)], 16 + 30 + 1),
+        (5, [0.0] * 9, 5),
+        (0, [10.0] * 1000, None),
+    ],
+    ids=[
+        "before the head passes its start",
+        "when it was at both ends",
+        "after so many beams",
+        "never: it stands still",
+    ],
+)
+def test_a_scan_ends(scan_beams, angles_deg, last):
+    counter = SweepCounter(scan_beams)
+    assert next((n for n, angle in enumerate(angles_deg, 1) if counter.add(math.radians(angle))), None) == last
 
 
 def test_the_servo_goes_through_its_range_and_back():

@@ -1,12 +1,11 @@
 """What is heard in a sector of the vehicle's own hull goes, wherever the vehicle is and turns to."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from clouds import SECOND
 
 from node_support.errors import RefusedInput
+from node_support.geometry import pose_matrix
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.sector_mask import SectorMask, SectorMaskParameters
 
@@ -19,13 +18,7 @@ ASTERN = SectorMaskParameters(start_angle=np.radians(150.0), width=np.radians(60
 def sonar_poses(frame_id, times):
     """Return where a sonar is that goes along, turns about its axis, and is tilted: T_odom_sonar (m, 4, 4)."""
     assert frame_id == "odom"
-    poses = np.tile(np.eye(4), (len(times), 1, 1))
-    for pose, time in zip(poses, times):
-        turned, tilted = 0.3 * time, 0.2
-        about_z = np.array([[np.cos(turned), -np.sin(turned), 0], [np.sin(turned), np.cos(turned), 0], [0, 0, 1]])
-        about_y = np.array([[np.cos(tilted), 0, np.sin(tilted)], [0, 1, 0], [-np.sin(tilted), 0, np.cos(tilted)]])
-        pose[:3, :3], pose[:3, 3] = about_z @ about_y, (40.0 + time, -7.0, -2.0)
-    return poses
+    return np.array([pose_matrix((40.0 + time, -7.0, -2.0), (0.0, 0.2, 0.3 * time)) for time in times])
 
 
 def turn_of(organized):
@@ -81,4 +74,4 @@ def test_beams_of_unknown_places_stay_and_a_scan_of_none_is_refused():
     cloud = turn_of(organized=False)
     np.testing.assert_array_equal(SectorMask(ASTERN, mostly_known)(cloud).points, cloud.points[stays])
     with pytest.raises(RefusedInput, match="unknown to tf"):
-        SectorMask(ASTERN, unknown)(replace(cloud))
+        SectorMask(ASTERN, unknown)(cloud)
