@@ -9,16 +9,15 @@ from mlsm_manager.joint_solver.comparisons import support
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.estimate import misfit_covariance, scale_covariance
 from mlsm_manager.joint_solver.live_solver import LiveSolver
-from mlsm_manager.joint_solver.loops import Loop, loops_of
+from mlsm_manager.joint_solver.loops import CONVINCING, Loop, loops_of
 from mlsm_manager.joint_solver.map_support import misfit_variances
 from mlsm_manager.joint_solver.normal_equations import (
     POSE_COLUMNS,
     RUN_COLUMNS,
     YAW,
-    Layout,
     NormalEquations,
-    Residuals,
     State,
+    moves_between,
     solution_of,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
@@ -29,7 +28,6 @@ from mlsm_manager.joint_solver.window import Window
 
 _MOMENTUM = 0.6  # of the last move: neighbours give way slowly, plain steps shrink by a tenth each, these by a quarter
 _PULLED_STEPS = 10  # with the pull of loops: comparisons meet by then
-_CONVINCING = 10.0  # of log likelihood, by which a run with loops must fit better
 _FIXED_STEP = 0.3  # m: deviation of a step of a path that is fixed, within which scans then find their places
 _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 
@@ -122,7 +120,7 @@ def with_loops_closed(live: LiveSolver, batch: BatchResult) -> LoopClosure:
         problem.step()
     other = fit_of(live.solution.with_state(problem.state))
     gain = other.log_likelihood - batch.log_likelihood
-    return LoopClosure(other, loops, gain) if gain > _CONVINCING else LoopClosure(batch, [], gain)
+    return LoopClosure(other, loops, gain) if gain > CONVINCING else LoopClosure(batch, [], gain)
 
 
 def fit_of(run: Solution, fixed_steps: Optional[State] = None) -> BatchResult:
@@ -146,7 +144,10 @@ def _solved_at(run: Solution, state: State) -> "_Batch":
 
 def _result(run: Solution, problem: "_Batch", steps: int, converged: bool) -> BatchResult:
     poses, of_run = problem.covariances()
-    poses = poses + misfit_covariance(_misfit(run.with_state(problem.state)))
+    parts = run.parameters.parts_per_turn
+    # How uncertain scans that fit nowhere make the place of each node.
+    misfits = np.repeat(misfit_variances(run.with_state(problem.state), 0) / parts, parts)
+    poses = poses + misfit_covariance(np.cumsum(np.append(0.0, misfits)))
     times, likelihood = run.log.node_times.copy(), problem.log_likelihood()
     return BatchResult(problem.state, times, poses, of_run, steps, converged, problem.told(), likelihood)
 
@@ -189,13 +190,6 @@ def solved_part(live: LiveSolver, first: int) -> PartResult:
     problem = _Batch(live.solution.since(first))
     steps, _ = problem.converge()
     return PartResult(problem.state.nodes[-1].copy(), problem.state.run.copy(), problem.newest_covariance(), steps)
-
-
-def _misfit(run: Solution) -> np.ndarray:
-    """Return how uncertain scans that fit nowhere make the place of each node (n,) [m^2]."""
-    parts = run.parameters.parts_per_turn
-    of_turns = misfit_variances(run, 0)
-    return np.cumsum(np.append(0.0, np.repeat(of_turns / parts, parts)))
 
 
 class _Batch(Window):
@@ -245,16 +239,14 @@ class _Batch(Window):
         equations = super()._expected()
         if self._fixed_steps is not None:
             now, fixed = (self._motion.poses[:, :2] + state.nodes[:, :2] for state in (self.state, self._fixed_steps))
-            _add_fixed_steps(equations, self._layout, now, fixed)
+            steps = np.arange(len(now) - 1)[:, np.newaxis] + np.array([1, 0])
+            equations.add(*moves_between(self._layout, steps, np.diff(now - fixed, axis=0), _FIXED_STEP))
         return equations
 
     def met(self) -> Tuple[PlacedPoints, Pairs]:
         """Return all points and their comparisons."""
         pairs, points, _ = self._surfaces_met(self._parameters.cut)[-1]
         return points, pairs
-
-    def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
-        return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
 
     def covariances(self) -> Tuple[np.ndarray, np.ndarray]:
         """Return those of the nodes' poses (n, 3, 3) and of the run's unknowns (2, 2)."""
@@ -285,14 +277,3 @@ class _Batch(Window):
     def newest_covariance(self) -> np.ndarray:
         """Return that of the newest node's and the run's unknowns (width + 2, width + 2)."""
         return self._own_covariance(self._layout.with_run(np.array([self._layout.last]))[0])
-
-
-def _add_fixed_steps(equations: NormalEquations, layout: Layout, places: np.ndarray, fixed: np.ndarray) -> None:
-    """Add that steps between all nodes, now at `places` (n, 2) [m] in map, are those of the path `fixed` (n, 2)."""
-    count = len(places) - 1
-    columns = layout.pose_columns(np.column_stack([np.arange(count), np.arange(count) + 1]))
-    errors = np.diff(places - fixed, axis=0)
-    for axis in (0, 1):
-        jacobian = np.tile([-1.0, 1.0], (count, 1))
-        weights = np.full(count, _FIXED_STEP**-2.0)
-        equations.add(Residuals(columns[:, :, axis], jacobian, errors[:, axis], weights))

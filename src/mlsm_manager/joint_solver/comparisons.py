@@ -4,7 +4,7 @@ A point is compared with its nearest neighbours in every group of scans.
 """
 
 from dataclasses import replace
-from typing import Iterable, Iterator, List, Optional, Sequence, Tuple
+from typing import Iterable, Iterator, Optional, Tuple
 
 import numpy as np
 
@@ -23,12 +23,10 @@ from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import PointTable
-from mlsm_manager.joint_solver.surface_points import ramp
+from mlsm_manager.joint_solver.surface_points import ramp, slants_of
 from mlsm_manager.joint_solver.weak_directions import discounted
 
-TIE = 0.05
-"""m by which a neighbour may be farther than the nearest one and still count in part. Were it 0, the nearest one would
-be decided by the last bit where two are equally near. More would compare each point with more neighbours."""
+TIE = 0.05  # m by which a neighbour may be farther than the nearest one and count in part, so that no bit decides
 FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
 COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one
 _PLACES = POSE_COLUMNS * np.arange(4)[:, np.newaxis] + np.arange(2)  # columns of x and y of a pair's nodes
@@ -72,15 +70,6 @@ def pairs_of(
     own, others = (Surfaces(np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
     limits = Limits(cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
     return weighed_pairs(lists.within(sources, targets, cut), own, others, limits)
-
-
-def met_with(
-    lists: Sequence[Neighbours], sources: PlacedPoints, sets: Sequence[PlacedPoints], cut: float,
-    parameters: SolverParameters,
-) -> List[Comparison]:  # fmt: skip
-    """Return the comparisons of `sources` with each of some `sets` of surfaces, each with its list of neighbours."""
-    pairs = (pairs_of(own, sources, targets, cut, parameters) for own, targets in zip(lists, sets))
-    return [(each, sources, targets) for each, targets in zip(pairs, sets)]
 
 
 def weighted(pairs: Pairs, factors: np.ndarray) -> Pairs:
@@ -179,13 +168,13 @@ class PostComparisons:
         if self._lists is None:
             self._lists = Neighbours(points, self._parameters.group_scans)
         near = _NEAR_IN_TIME * self._parameters.parts_per_turn
-        pairs = weighted(post_pairs(self._lists, sources, points, cut, near), self._importance)
+        pairs = weighted(_post_pairs(self._lists, sources, points, cut, near), self._importance)
         self.compared = sources.scans[np.unique(pairs.rows)]
-        add_comparisons(equations, layout, along_and_across(pairs, sources, points), self._parameters, cut)
+        add_comparisons(equations, layout, _along_and_across(pairs, sources, points), self._parameters, cut)
 
 
-def post_pairs(
-    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int = _NEAR_IN_TIME
+def _post_pairs(
+    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets`.
 
@@ -201,7 +190,7 @@ def post_pairs(
     return Pairs(rows[kept], neighbours[kept], importance[kept])
 
 
-def along_and_across(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> "Iterator[Comparison]":
+def _along_and_across(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> Iterator[Comparison]:
     """Yield the comparisons along the sources' lines of sight, and those across, as such with surfaces.
 
     Along, a point is as certain as its range; across, it may be anywhere in its beam: its slant is its range.
@@ -210,12 +199,5 @@ def along_and_across(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints)
     each = Pairs(np.arange(len(i)), np.arange(len(i)), pairs.importance)
     heard, met = sources.selected(i), targets.selected(j)
     for axis in (heard.normals, np.column_stack([-heard.normals[:, 1], heard.normals[:, 0]])):
-        yield (
-            each,
-            replace(heard, slants=_slants(heard.arms, axis)),
-            replace(met, normals=axis, slants=_slants(met.arms, axis)),
-        )
-
-
-def _slants(arms: np.ndarray, axis: np.ndarray) -> np.ndarray:
-    return np.abs(arms[:, 0] * axis[:, 1] - arms[:, 1] * axis[:, 0])
+        slants, met_slants = (slants_of(points.arms, axis) for points in (heard, met))
+        yield each, replace(heard, slants=slants), replace(met, normals=axis, slants=met_slants)

@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.loops import Bend, ClosedLoop, Loop, confirmed, with_newest
+from mlsm_manager.joint_solver.loops import CONVINCING, Bend, ClosedLoop, Loop, confirmed, with_newest
 from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_newest
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, YAW, State
@@ -25,7 +25,6 @@ ODOMETRY = "odometry"
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
 _FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
-_CONVINCING = 10.0  # of log likelihood, by which a path with a loop must fit better
 
 
 class LiveSolver:
@@ -269,7 +268,7 @@ class LiveSolver:
         bend = Bend.of(loops, now, places)
         found = [self._bent(bend, share) for share in bend.tried]
         likelihood, share, state = max(found, key=lambda one: one[0])
-        if likelihood < before + _CONVINCING:
+        if likelihood < before + CONVINCING:
             self.state = now
             return window
         self.state = state
@@ -278,7 +277,7 @@ class LiveSolver:
         self.fixes = Fixes()  # in the map as it was
         seconds = self.log.node_times[-1] - self.log.node_times[loops[-1].older + 1]
         shift = state.nodes[-1, :2] - now.nodes[-1, :2]
-        self.closed = ClosedLoop(float(seconds), shift, likelihood - before)
+        self.closed = ClosedLoop(float(seconds), shift)
         return self._fitted()
 
     def _bent(self, bend: Bend, share: float) -> Tuple[float, float, State]:

@@ -7,25 +7,24 @@ were as certain as the older visit stay, and what was lost since then is given b
 """
 
 from dataclasses import dataclass
-from typing import List, Optional, Sequence, Tuple
+from typing import Iterator, List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.joint_solver.map_support import Surfaces
-from mlsm_manager.joint_solver.normal_equations import Layout, NormalEquations, Residuals, State
+from mlsm_manager.joint_solver.normal_equations import Layout, Residuals, State, moves_between
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, PlaceCandidate, best_place
+from mlsm_manager.joint_solver.places import FEWEST_POINTS, MOST_POINTS, REACH, PlaceCandidate, best_place, thinned
 from mlsm_manager.joint_solver.solution import MAP, Solution
 
-APART = 20
-"""Scans: newer ones are compared anyway, and tie a scan to where it is."""
+CONVINCING = 10.0  # of log likelihood, by which a run with loops must fit better
+_APART = 20  # scans: newer ones are compared anyway, and tie a scan to where it is
 _DRIFT = 5.0  # m, deviation: of a scan against one that is so much older
 _GAIN = 0.25  # by which the share of points on surfaces must exceed the one at the present place
 _SAME = 1.0  # m: so near to a scan's points lie those of the older one that it lies on
 _ALIKE = 2.5  # m by which neighbouring scans may differ
-NEIGHBOURS = 3
-"""Scans before and after that are asked, and how many, the scan included, must agree."""
+_NEIGHBOURS = 3  # scans before and after that are asked, and how many, the scan included, must agree
 _DEVIATION = 0.5  # m: of a place that is found
 
 
@@ -50,59 +49,46 @@ def loops_of(solution: Solution) -> List[Loop]:
 
     None where turns are cut into parts: a part hears too little to be told from others.
     """
-    log, parameters = solution.log, solution.parameters
+    log, parameters, found = solution.log, solution.parameters, []
     if parameters.parts_per_turn > 1:
         return []
     points = solution.placed(log.surfaces.heard(0, log.scan_count))
-    found = [_loop(points, scan, parameters) for scan in range(APART, log.scan_count)]
+    for scan in range(_APART, log.scan_count):
+        own = np.flatnonzero(points.scans == scan)
+        if len(own) >= FEWEST_POINTS:
+            sources = points.selected(thinned(own, MOST_POINTS))
+            found.append(_loop_of(sources, points.selected(points.scans <= scan - _APART), scan, parameters))
     return agreed([loop for loop in found if loop is not None])
 
 
 def agreed(loops: Sequence[Loop]) -> List[Loop]:
     """Return those of `loops` (one per scan at most) that enough neighbouring scans confirm."""
-    return [loop for loop in loops if sum(_confirms(other, loop) for other in loops) >= NEIGHBOURS]
+
+    def confirms(other: Loop, loop: Loop) -> bool:
+        near = np.hypot(*(other.place.shift - loop.place.shift)) <= _ALIKE
+        return abs(other.scan - loop.scan) <= _NEIGHBOURS and near
+
+    return [loop for loop in loops if sum(confirms(other, loop) for other in loops) >= _NEIGHBOURS]
 
 
-def add_loops(
-    equations: NormalEquations, layout: Layout, loops: Sequence[Loop], nodes: np.ndarray, start: State
-) -> None:
-    """Add that the scans of `loops` are moved by their shifts against `start`, in which these were found.
+def pulls_of(loops: Sequence[Loop], layout: Layout, nodes: np.ndarray, start: State) -> Iterator[Residuals]:
+    """Return that the scans of `loops` are moved by their shifts against `start`, in which these were found.
 
     nodes: (n, width) as they are now.
     """
-    if not loops:
-        return
     ends = np.array([[loop.scan + 1, loop.older + 1] for loop in loops])
-    columns = layout.pose_columns(ends)
-    shifts = np.array([loop.place.shift for loop in loops])
-    for axis in (0, 1):
-        now, then = (some[ends[:, 0], axis] - some[ends[:, 1], axis] for some in (nodes, start.nodes))
-        jacobian = np.tile([1.0, -1.0], (len(loops), 1))
-        weight = np.full(len(loops), _DEVIATION**-2.0)
-        equations.add(Residuals(columns[:, :, axis], jacobian, now - then - shifts[:, axis], weight))
+    now, then = (some[ends[:, 0], :2] - some[ends[:, 1], :2] for some in (nodes, start.nodes))
+    return moves_between(layout, ends, now - then - np.array([loop.place.shift for loop in loops]), _DEVIATION)
 
 
-def _confirms(other: Loop, loop: Loop) -> bool:
-    near = np.hypot(*(other.place.shift - loop.place.shift)) <= _ALIKE
-    return abs(other.scan - loop.scan) <= NEIGHBOURS and near
-
-
-def _loop(points: PlacedPoints, scan: int, parameters: SolverParameters) -> Optional[Loop]:
-    own = np.flatnonzero(points.scans == scan)
-    if len(own) < FEWEST_POINTS:
-        return None
-    sources = points.selected(own[:: max(1, len(own) // MOST_POINTS)])
-    return loop_of(sources, points.selected(points.scans <= scan - APART), scan, parameters)
-
-
-def reach_of(sources: PlacedPoints) -> Tuple[np.ndarray, float]:
+def _reach_of(sources: PlacedPoints) -> Tuple[np.ndarray, float]:
     """Return the middle (2,) of a scan's points, and how far from it [m] they may lie once the scan is moved."""
     return sources.places.mean(axis=0), float(np.ptp(sources.places, axis=0).max() + REACH * _DRIFT)
 
 
-def loop_of(sources: PlacedPoints, older: PlacedPoints, scan: int, parameters: SolverParameters) -> Optional[Loop]:
+def _loop_of(sources: PlacedPoints, older: PlacedPoints, scan: int, parameters: SolverParameters) -> Optional[Loop]:
     """Return where the points of a scan lie on `older` ones, if that is certain and far from where they are."""
-    middle, radius = reach_of(sources)
+    middle, radius = _reach_of(sources)
     targets = older.selected(np.abs(older.places - middle).max(axis=1) < radius)
     surfaces = Surfaces(targets, parameters)
     if not len(targets) or surfaces.shares(sources, sources.places[np.newaxis])[0] > 1.0 - _GAIN:
@@ -117,23 +103,22 @@ def loop_of(sources: PlacedPoints, older: PlacedPoints, scan: int, parameters: S
 _EVERY = 3  # scans of which one is looked at, and the next ones too where it has a loop
 _LANDMARK_DISTANCE = 3.0  # m between places of older scans that are looked at: nearer ones heard the same
 _MOST_LANDMARKS = 60  # nearest ones; bounds the time of a search to some tens of milliseconds
-_TRIED = (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0)
 _HELD = 0.01  # m, deviation of a path that lost nothing
 
 
 def with_newest(solution: Solution, before: Sequence[Loop]) -> Tuple[Loop, ...]:
     """Return the loops found `before` that the newest scan may confirm, and its own where it has one."""
     scan, parameters = solution.log.scan_count - 1, solution.parameters
-    kept = tuple(loop for loop in before if loop.scan >= scan - NEIGHBOURS)
+    kept = tuple(loop for loop in before if loop.scan >= scan - _NEIGHBOURS)
     surfaces = solution.log.surfaces
     own = surfaces.rows(scan, scan + 1)
     in_turn = scan % _EVERY == 0 or len(kept) > 0
-    if not in_turn or scan < APART or len(own) < FEWEST_POINTS:
+    if not in_turn or scan < _APART or len(own) < FEWEST_POINTS:
         return kept
-    sources = solution.placed(surfaces.points(own[:: max(1, len(own) // MOST_POINTS)]))
-    rows, _ = surfaces.rows_of(_landmarks(solution, *reach_of(sources)))
+    sources = solution.placed(surfaces.points(thinned(own, MOST_POINTS)))
+    rows, _ = surfaces.rows_of(_landmarks(solution, *_reach_of(sources)))
     older = solution.placed(surfaces.points(rows))
-    loop = loop_of(sources, older, scan, parameters) if len(older) else None
+    loop = _loop_of(sources, older, scan, parameters) if len(older) else None
     return kept if loop is None else (*kept, loop)
 
 
@@ -145,7 +130,7 @@ def confirmed(loops: Sequence[Loop], scan: int) -> List[Loop]:
 
 def _landmarks(solution: Solution, middle: np.ndarray, radius: float) -> np.ndarray:
     """Return older scans (n,), ascending, whose ends lie within `radius` [m] of `middle` (2,) and apart."""
-    last = solution.log.scan_count - APART
+    last = solution.log.scan_count - _APART
     scans = np.flatnonzero((solution.submaps.numbers[:last] == MAP) & (solution.log.surfaces.counts[:last] > 0))
     places = solution.node_places(scans + 1)
     distances = np.hypot(*(places - middle).T)
@@ -197,7 +182,7 @@ class Bend:
     @property
     def tried(self) -> Sequence[float]:
         """Shares of the shift that the oldest free node may make; what is left is lost within the window."""
-        return _TRIED if self.lost.any() else _TRIED[:1]
+        return (0.0, 1.0 / 3.0, 2.0 / 3.0, 1.0) if self.lost.any() else (0.0,)
 
     def state(self, share: float) -> State:
         """Return the start, bent by a `share` of the shift; the free nodes move as one."""
@@ -222,7 +207,6 @@ class ClosedLoop:
 
     seconds: float
     shift: np.ndarray
-    gain: float
 
     def line(self) -> str:
         return f"found a place heard {self.seconds:.0f} s ago again: moved by {np.hypot(*self.shift):.1f} m"

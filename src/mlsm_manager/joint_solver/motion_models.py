@@ -9,7 +9,7 @@ from typing import Callable, Dict, List, Mapping, NamedTuple, Optional, Protocol
 
 import numpy as np
 
-from mlsm_manager.joint_solver.normal_equations import POSE, YAW, NormalEquations, Residuals
+from mlsm_manager.joint_solver.normal_equations import YAW, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.prior_mixture import PriorMixture
 from mlsm_manager.scan_matching.scan import Fading
@@ -26,10 +26,10 @@ _TURN_WALK = 0.22  # rad/sqrt(s): by turns of 0.05 rad/s that last 10 s, of whic
 
 @dataclass(frozen=True)
 class Drift:
-    """How a motion goes on after a node, as matching.problem.state describes it: the errors of the odometry.
+    """How a motion goes on after a node: the errors of the odometry, see scan_matching.scan_path.
 
     values: (5,) rate x y [m/s] and yaw [rad/s] in base_link, scale, direction. slopes: (5, width) their derivatives by
-    the node's unknowns; a row of zeros is what the model does not estimate.
+    the node's unknowns; zeros of what the model does not estimate.
     """
 
     values: np.ndarray
@@ -81,8 +81,8 @@ class OdometryModel(Protocol):
     def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
         """Return the unknowns (n, width) expected one step of `motion` (n + 1) after each of `nodes` (n, width)."""
 
-    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
-        """Return what ties n `nodes` (n, width) together; starts: (n - 1,) columns of all but the last. motion: (n)."""
+    def steps(self, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+        """Return what ties n `nodes` (n, width) together, whose columns stand one after the other; motion: (n)."""
 
     def gain(self, nodes: np.ndarray) -> np.ndarray:
         """Return the complex factors (n,) of the reference path after `nodes` (n, width)."""
@@ -93,29 +93,6 @@ class OdometryModel(Protocol):
     def fading(self, node: np.ndarray) -> Optional[Fading]:
         """Return how the rates of `drift` change with the time since the node (width,); None where they stay."""
         return None
-
-
-class Transition(NamedTuple):
-    """matrix: (width, width) derivatives of the next node by this one. noise: (width, width) covariance."""
-
-    matrix: np.ndarray
-    noise: np.ndarray
-
-    @classmethod
-    def of(cls, odometry: OdometryModel, nodes: np.ndarray, motion: Motion) -> "Transition":
-        """Return that from the first to the second of `nodes` (2, width), where the odometry reported `motion` (2)."""
-        equations = NormalEquations(2 * odometry.width)
-        equations.add(*odometry.steps(np.zeros(1, dtype=np.int64), nodes, motion))
-        information, _ = equations.dense()
-        here, there = slice(0, odometry.width), slice(odometry.width, 2 * odometry.width)
-        noise = np.linalg.inv(information[there, there])
-        return cls(-noise @ information[there, here], noise)
-
-    def step_covariance(self, covariance: np.ndarray) -> np.ndarray:
-        """Return that of the next node (width, width), seen from this one's pose; `covariance` is this node's."""
-        known_pose = covariance.copy()
-        known_pose[POSE] = known_pose[:, POSE] = 0.0
-        return self.matrix @ known_pose @ self.matrix.T + self.noise
 
 
 class Change(NamedTuple):
@@ -153,23 +130,29 @@ class Compass:
         return replace(self, heading_deviation=_FREED_HEADING, heading_correlation_time=_FREED_TIME)
 
 
-def changes_of(
-    starts: np.ndarray, nodes: np.ndarray, times: np.ndarray,
-    walks: Mapping[int, float], changes: Mapping[int, Change], compass: Optional[Compass],
-) -> Residuals:  # fmt: skip
-    """Return how unknowns change; starts: (n - 1,) columns of all nodes but the last. nodes: (n, width) at `times` [s].
+def step_columns(nodes: np.ndarray, *columns: int) -> np.ndarray:
+    """Return where `columns` (c,) of each of `nodes` (n, width) but the last stand, (n - 1, c)."""
+    count, width = nodes.shape
+    return width * np.arange(count - 1)[:, np.newaxis] + np.array(columns)
 
-    Both by columns of a node. walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others.
-    compass: that of which YAW is the error; None without one.
+
+def changes_of(
+    nodes: np.ndarray, times: np.ndarray, walks: Mapping[int, float], changes: Mapping[int, Change],
+    compass: Optional[Compass],
+) -> Residuals:  # fmt: skip
+    """Return how unknowns of `nodes` (n, width) at `times` [s] change, by their columns.
+
+    walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others. compass: that of which YAW is
+    the error; None without one.
     """
     durations = np.diff(times)
     one = np.ones(len(durations))
     changes = {**changes, **{column: Change(one, each**2 * durations) for column, each in walks.items()}}
     if compass is not None:
         changes[YAW] = compass.change(times)
-    columns, values = np.array(list(changes))[:, np.newaxis], nodes[:, list(changes)].T
+    columns, values = step_columns(nodes, *changes).T, nodes[:, list(changes)].T
     kept, variances = (np.stack(each) for each in zip(*changes.values()))
-    places = np.stack([starts + nodes.shape[1] + columns, starts + columns], axis=-1)
+    places = np.stack([columns + nodes.shape[1], columns], axis=-1)
     jacobian = np.stack([np.ones_like(kept), -kept], axis=-1)
     weight = 1.0 / np.maximum(variances, _CONSTANT_DEVIATION**2)
     residual = values[:, 1:] - kept * values[:, :-1]

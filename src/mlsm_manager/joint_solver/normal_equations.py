@@ -4,10 +4,9 @@ A node is a moment between two scans. Its first three columns correct the odomet
 pose plus x, y and yaw. An odometry model may add columns of its own. The run's unknowns come after all nodes.
 """
 
-from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import NamedTuple, Sequence, Tuple
+from functools import cached_property, partial
+from typing import Callable, Iterator, NamedTuple, Sequence, Tuple
 
 import numpy as np
 import scipy.linalg
@@ -21,8 +20,10 @@ POSE = slice(0, 3)
 POSE_COLUMNS = 3
 RANGE_SCALE, DELAY = range(2)
 RUN_COLUMNS = 2
-BEFORE_THE_RUN = -2
-"""Stands for the scan of points that were in the map before the run; its nodes, -2 and -1, do not exist."""
+BEFORE_THE_RUN = -2  # stands for the scan of points from before the run; its nodes, -2 and -1, do not exist
+HELD_DEVIATION = 1e-6  # stands for a deviation of zero
+_REGULARISATION = 1e-9  # of a column that no residual touches: it stays where it is
+_MOST_DENSE = 5000  # unknowns, about 1000 scans or parts of scans: up to there dense takes 200 MB and is faster
 
 
 @dataclass
@@ -63,11 +64,6 @@ class Layout:
         """Return the place of the first column of each node."""
         return self.width * (np.asarray(node) - self.first)
 
-    @cached_property
-    def step_starts(self) -> np.ndarray:
-        """(last - first,) places of the first columns of all free nodes but the last."""
-        return self.width * np.arange(self.last - self.first)
-
     def with_run(self, nodes: np.ndarray) -> np.ndarray:
         """Return the columns (n, width + 2) of all unknowns of free `nodes` (n,), each followed by those of the run."""
         own = self.node_start(nodes)[:, np.newaxis] + np.arange(self.width)
@@ -82,15 +78,6 @@ class Layout:
             starts = np.where(nodes >= self.first, starts, frozen)
         starts = np.where(np.asarray(nodes) >= 0, starts, -POSE_COLUMNS)
         return np.maximum(starts[..., np.newaxis] + np.arange(POSE_COLUMNS), -1)
-
-
-_REGULARISATION = 1e-9  # of a column that no residual touches: it stays where it is
-_MOST_DENSE = 5000
-"""Unknowns, about 1000 scans or parts of scans: up to there 200 MB. With 3895 of a strafing vehicle's 50 minutes a step
-took 0.6 s of CPU time, a sparse solution 3.4 s and 1.2 GB."""
-
-
-HELD_DEVIATION = 1e-6  # stands for a deviation of zero
 
 
 class Residuals(NamedTuple):
@@ -114,6 +101,17 @@ def prior_of(columns: np.ndarray, off: np.ndarray, deviation: np.ndarray, held: 
     pairs = np.full((len(off), 2), -1)
     pairs[:, 0], pairs[: len(held), 1] = columns, held
     return Residuals(pairs, np.tile([1.0, -1.0], (len(off), 1)), off, np.maximum(deviation, HELD_DEVIATION) ** -2.0)
+
+
+def moves_between(layout: Layout, ends: np.ndarray, errors: np.ndarray, deviation: float) -> Iterator[Residuals]:
+    """Yield in x and y that moves from the second to the first of two nodes, `ends` (m, 2), err by `errors` (m, 2) [m].
+
+    deviation: m, in each direction.
+    """
+    columns = layout.pose_columns(ends)
+    jacobian, weights = np.tile([1.0, -1.0], (len(ends), 1)), np.full(len(ends), deviation**-2.0)
+    for axis in (0, 1):
+        yield Residuals(columns[:, :, axis], jacobian, errors[:, axis], weights)
 
 
 class NormalEquations:
@@ -167,23 +165,16 @@ class NormalEquations:
         return (whole[: self.size, : self.size] + _REGULARISATION * scipy.sparse.eye(self.size)).tocsc()
 
 
-def solution_of(equations: NormalEquations) -> "EquationSolution":
-    """Return the solution, found in the way that is faster for its size."""
-    return DenseSolution(equations) if equations.size <= _MOST_DENSE else SparseSolution(equations)
-
-
-class EquationSolution(ABC):
-    """Solves normal equations, and tells covariances. step: (size,) of the free unknowns.
+@dataclass(frozen=True)
+class EquationSolution:
+    """solve: returns the inverse of the information times (size, k). step: (size,) of the free unknowns.
 
     to_held: (size, h) the information between the free unknowns and the held ones.
     """
 
+    solve: Callable[[np.ndarray], np.ndarray]
     step: np.ndarray
     to_held: np.ndarray
-
-    @abstractmethod
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        """Return the inverse of the information times `right` (size, k)."""
 
     def covariances(self, columns: np.ndarray, held_covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
         """Return the covariances (b, k, k) of b sets of unknowns, `columns` (b, k), where held ones err by
@@ -200,25 +191,18 @@ class EquationSolution(ABC):
         return own + by_held @ held_covariance @ by_held.transpose(0, 2, 1), own
 
 
-class DenseSolution(EquationSolution):
-    """Of problems of bounded size."""
-
-    def __init__(self, equations: NormalEquations) -> None:
-        information, self.to_held = equations.dense()
-        self._factor = scipy.linalg.cho_factor(information)
-        self.step = -scipy.linalg.cho_solve(self._factor, equations.gradient)
-
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        return scipy.linalg.cho_solve(self._factor, right)
+def dense_solution(equations: NormalEquations) -> EquationSolution:
+    information, to_held = equations.dense()
+    solve = partial(scipy.linalg.cho_solve, scipy.linalg.cho_factor(information))
+    return EquationSolution(solve, -solve(equations.gradient), to_held)
 
 
-class SparseSolution(EquationSolution):
-    """Of long runs, in which nothing is held."""
+def sparse_solution(equations: NormalEquations) -> EquationSolution:
+    """Return the solution of equations in which nothing is held."""
+    solve = scipy.sparse.linalg.splu(equations.sparse()).solve
+    return EquationSolution(solve, -solve(equations.gradient), np.zeros((equations.size, 0)))
 
-    def __init__(self, equations: NormalEquations) -> None:
-        self.to_held = np.zeros((equations.size, 0))
-        self._factor = scipy.sparse.linalg.splu(equations.sparse())
-        self.step = -self._factor.solve(equations.gradient)
 
-    def solve(self, right: np.ndarray) -> np.ndarray:
-        return self._factor.solve(right)
+def solution_of(equations: NormalEquations) -> EquationSolution:
+    """Return the solution, found in the way that is faster for its size; of large ones nothing may be held."""
+    return dense_solution(equations) if equations.size <= _MOST_DENSE else sparse_solution(equations)

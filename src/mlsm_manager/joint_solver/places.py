@@ -1,8 +1,5 @@
 """One search over places, for all who ask where scans lie on what other scans heard (correlative search, Olson 2009).
 
-Every place within reach is tried with few points, the best ones again with all and a little aside. A place is certain
-if the points fit there, and at no other place nearly as well.
-
 It is used where the solver's own steps do not reach. A scan whose motion is hardly known is laid on the scans before
 it. After a silence of the sonar it is sought in the whole map, at the places that the motion since then allows; if the
 echoes do not fit at one of them alone, it is better not to know where the vehicle is.
@@ -15,21 +12,16 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.joint_solver.map_support import Surfaces, nearness
-from mlsm_manager.joint_solver.motion_models import Transition
-from mlsm_manager.joint_solver.normal_equations import POSE, RUN_COLUMNS, YAW, State
+from mlsm_manager.joint_solver.normal_equations import POSE, RUN_COLUMNS, YAW, NormalEquations, State
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import MAP, Solution
 from node_support.geometry import grid
 
-FEWEST_POINTS = 25
-"""On surfaces, that a scan must hear to tell a place: fewer fit anywhere."""
-REACH = 3.0
-"""Standard deviations of the place within which is searched."""
-POINT_WEIGHT = 0.1
-"""Log-likelihood of a point on a surface: neighbours share errors."""
-MOST_POINTS = 150
-"""Of one scan, that are laid on each place; neighbours on a wall say the same."""
+FEWEST_POINTS = 25  # on surfaces, that a scan must hear to tell a place: fewer fit anywhere
+REACH = 3.0  # standard deviations of the place within which is searched
+MOST_POINTS = 150  # of one scan, that are laid on each place; neighbours on a wall say the same
+_POINT_WEIGHT = 0.1  # log-likelihood of a point on a surface: neighbours share errors
 _FEW_POINTS = 60  # of the scans, where all places are tried
 _CELL = 1.0  # m: about twice the deviation of an echo, so that no place falls between two cells
 _MOST_CELLS = 60  # on each side of the expected place
@@ -66,31 +58,37 @@ class PlaceCandidate:
         )
 
 
+def thinned(rows: np.ndarray, most: int) -> np.ndarray:
+    """Return about `most` of the rows, evenly."""
+    return rows[:: max(1, len(rows) // most)]
+
+
 def best_place(covariance: np.ndarray, sources: PlacedPoints, surfaces: Surfaces) -> PlaceCandidate:
     """Return where `sources`, moved as one, fit best to `surfaces`; nowhere, with a fit of 0, without either.
 
-    covariance: (2, 2) m^2, of their place.
+    covariance: (2, 2) m^2, of their place. Every place within reach is tried with few points, the best ones again with
+    all and a little aside.
     """
-    reach = widest(covariance)
+    reach = _widest(covariance)
     if not len(sources) or not len(surfaces.points):
         return PlaceCandidate(np.zeros(2), 0.0, 0.0, 0.0, reach)
-    shifts = places_within(covariance, _MOST_CELLS)
-    few = sources.selected(np.arange(0, len(sources), max(1, len(sources) // _FEW_POINTS)))
-    shares = surfaces.shares(few, _moved(few, shifts))
+    shifts = _places_within(covariance, _MOST_CELLS)
+    few = sources.selected(thinned(np.arange(len(sources)), _FEW_POINTS))
+    shares = surfaces.shares(few, few.places + shifts[:, np.newaxis])
     found = [_refined(sources, surfaces, shift) for shift in _best_of(shifts, shares)]
     total, information = sources.qualities.sum(), np.linalg.inv(covariance)
-    likelihoods = [POINT_WEIGHT * share * total - 0.5 * shift @ information @ shift for shift, share in found]
+    likelihoods = [_POINT_WEIGHT * share * total - 0.5 * shift @ information @ shift for shift, share in found]
     best, fit = found[int(np.argmax(likelihoods))]
     others = [share for shift, share in found if np.hypot(*(shift - best)) > _OTHER]
     return PlaceCandidate(best, fit, float(shares[0]), max(others, default=0.0), reach)
 
 
-def widest(covariance: np.ndarray) -> float:
+def _widest(covariance: np.ndarray) -> float:
     """Return the largest deviation [m] of a place with a covariance (2, 2) [m^2]."""
     return float(np.sqrt(np.linalg.eigvalsh(covariance)[-1]))
 
 
-def places_within(covariance: np.ndarray, most: int) -> np.ndarray:
+def _places_within(covariance: np.ndarray, most: int) -> np.ndarray:
     """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none.
 
     They are a cell apart; farther where there would be more than `most` on each side.
@@ -101,10 +99,6 @@ def places_within(covariance: np.ndarray, most: int) -> np.ndarray:
     shifts = np.stack(np.meshgrid(x, y, indexing="ij"), axis=-1).reshape(-1, 2)
     distance = np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(covariance))
     return np.concatenate([np.zeros((1, 2)), shifts[distance <= REACH**2]])
-
-
-def _moved(sources: PlacedPoints, shifts: np.ndarray) -> np.ndarray:
-    return sources.places + shifts[:, np.newaxis]
 
 
 def _best_of(shifts: np.ndarray, shares: np.ndarray) -> List[np.ndarray]:
@@ -121,7 +115,7 @@ def _best_of(shifts: np.ndarray, shares: np.ndarray) -> List[np.ndarray]:
 def _refined(sources: PlacedPoints, surfaces: Surfaces, shift: np.ndarray) -> Tuple[np.ndarray, float]:
     """Return the best shift (2,) of the scans about one, and the share there."""
     shifts = shift + grid(_ASIDE)
-    shares = surfaces.shares(sources, _moved(sources, shifts))
+    shares = surfaces.shares(sources, sources.places + shifts[:, np.newaxis])
     best = int(np.argmax(shares))
     return shifts[best], float(shares[best])
 
@@ -145,7 +139,7 @@ def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optio
     what came of the search in the whole map; None where none was needed.
     """
     covariance = covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
-    found = place_after_silence(solution, covariance, silent) if silent else None
+    found = _place_after_silence(solution, covariance, silent) if silent else None
     if found is not None and found.is_certain and not solution.submaps.is_apart:
         solution.move_newest(_shares_of_move(solution.log, solution.log.scan_count - 1), found.shift)
     elif found is not None and found.reach > solution.parameters.wide_cut:
@@ -163,11 +157,8 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     covariance asks (correlative search, Olson 2009).
     """
     log, state, newest = solution.log, solution.state, solution.state.nodes[-1]
-    last = log.scan_count
-    nodes = np.array([last - 1, last])
-    transition = Transition.of(solution.parameters.odometry, state.nodes[nodes], log.node_motion(nodes))
-    step = transition.step_covariance(covariance)
-    if _KNOWN * widest(step[:2, :2]) < solution.parameters.cut:
+    last, step = log.scan_count, covariance_since(solution, covariance, 0)
+    if _KNOWN * _widest(step[:2, :2]) < solution.parameters.cut:
         return newest
     before = log.surfaces.rows(min(max(first, last - 1 - _COMPARED_SCANS), last - 1), last - 1)
     own = log.surfaces.rows(last - 1, last)
@@ -180,18 +171,17 @@ def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) ->
     return search.beside(state, step, MOST_POINTS)[1]
 
 
-def place_after_silence(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
+def _place_after_silence(solution: Solution, covariance: np.ndarray, silent: int) -> Optional[PlaceCandidate]:
     """Return where the newest scan was taken, after `silent` scans before it that heard nothing.
 
-    covariance: (width, width) of the node before these. None where the motion since is known well
-    enough, or the scan hears too little itself.
+    covariance: (width, width) of the node before these. None where the motion since is known well enough, or the scan
+    hears too little itself.
     """
-    log, parameters = solution.log, solution.parameters
-    last = log.scan_count
-    own, place = log.surfaces.rows(last - 1, last), _covariance_since(solution, covariance, silent)[:2, :2]
-    if widest(place) * _KNOWN < parameters.cut or len(own) < FEWEST_POINTS:
+    last = solution.log.scan_count
+    own, place = solution.log.surfaces.rows(last - 1, last), covariance_since(solution, covariance, silent)[:2, :2]
+    if _widest(place) * _KNOWN < solution.parameters.cut or len(own) < FEWEST_POINTS:
         return None
-    return _best_place(solution, own[:: max(1, len(own) // MOST_POINTS)], place)
+    return _best_place(solution, thinned(own, MOST_POINTS), place)
 
 
 def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
@@ -202,7 +192,7 @@ def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
     log = solution.log
     last, first = log.scan_count, solution.submaps.start
     rows = log.surfaces.rows(max(first, last - _SUBMAP_SCANS), last)
-    found = _best_place(solution, rows[:: max(1, len(rows) // _SUBMAP_POINTS)], covariance)
+    found = _best_place(solution, thinned(rows, _SUBMAP_POINTS), covariance)
     if found.is_certain:
         solution.move_newest(_shares_of_move(log, first), found.shift)
         solution.submaps.join()
@@ -212,7 +202,7 @@ def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
 def _best_place(solution: Solution, rows: np.ndarray, covariance: np.ndarray) -> PlaceCandidate:
     """Return where in the map the points in `rows` fit best."""
     sources = solution.placed(solution.log.surfaces.points(rows))
-    targets = _map_around(solution, sources, REACH * widest(covariance) + solution.parameters.cut)
+    targets = _map_around(solution, sources, REACH * _widest(covariance) + solution.parameters.cut)
     return best_place(covariance, sources, Surfaces(targets, solution.parameters))
 
 
@@ -229,10 +219,10 @@ class _Search(NamedTuple):
         step: covariance (width, width) of the node. most: points of the scan that are compared.
         """
         solution, parameters = self.solution.with_state(state), self.solution.parameters
-        sources = solution.placed(solution.log.surfaces.points(self.own[:: max(1, len(self.own) // most)]))
-        shifts = places_within(step[:2, :2], _MOST_CELLS_BESIDE)
+        sources = solution.placed(solution.log.surfaces.points(thinned(self.own, most)))
+        shifts = _places_within(step[:2, :2], _MOST_CELLS_BESIDE)
         support = self.surfaces.support(sources, _with_ends_moved(sources, shifts))
-        found = POINT_WEIGHT * MOST_POINTS / most * support
+        found = _POINT_WEIGHT * MOST_POINTS / most * support
         if parameters.post_confidence:
             found = found + parameters.post_confidence * _POST_WEIGHT * _post_support(solution, shifts)
         costs = 0.5 * np.einsum("na,nb,ab->n", shifts, shifts, np.linalg.inv(step[:2, :2]))
@@ -273,17 +263,22 @@ def _post_support(solution: Solution, shifts: np.ndarray) -> np.ndarray:
     return (nearness(distance).reshape(places.shape[:2]) * sources.qualities).sum(axis=1)
 
 
-def _covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -> np.ndarray:
+def covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -> np.ndarray:
     """Return that of the newest node (width, width) as seen from the one before `silent` scans and the newest one.
 
     covariance: (width, width) of that node.
     """
-    log, nodes, own = solution.log, solution.state.nodes, covariance.copy()
+    log, model, own = solution.log, solution.parameters.odometry, covariance.copy()
+    here, there = slice(0, model.width), slice(model.width, 2 * model.width)
     own[POSE] = own[:, POSE] = 0.0
     for node in range(log.scan_count - 1 - silent, log.scan_count):
+        equations = NormalEquations(2 * model.width)
         motion = log.node_motion(np.array([node, node + 1]))
-        step = Transition.of(solution.parameters.odometry, nodes[node : node + 2], motion)
-        own = step.matrix @ own @ step.matrix.T + step.noise
+        equations.add(*model.steps(solution.state.nodes[node : node + 2], motion))
+        information, _ = equations.dense()
+        noise = np.linalg.inv(information[there, there])
+        step = -noise @ information[there, here]
+        own = step @ own @ step.T + noise
     return own
 
 

@@ -17,6 +17,7 @@ from mlsm_manager.joint_solver.motion_models import (
     Drift,
     OdometryModel,
     changes_of,
+    step_columns,
 )
 from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, YAW, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, product, stretched
@@ -102,18 +103,18 @@ class DvlFactors(OdometryModel):
         slopes[[3, 4], [SCALE, DIRECTION]] = 1.0
         return Drift(values, slopes)
 
-    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
-        changes = changes_of(starts, nodes, motion.times, self._walks, {}, self.compass)
-        return [*self._positions(starts, nodes, motion), changes]
+    def steps(self, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+        changes = changes_of(nodes, motion.times, self._walks, {}, self.compass)
+        return [*self._positions(nodes, motion), changes]
 
-    def _positions(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> Iterator[Residuals]:
+    def _positions(self, nodes: np.ndarray, motion: Motion) -> Iterator[Residuals]:
         """Yield the steps in x and in y. While positions are held nobody knows how far the vehicle goes.
 
         Noise is one of the reported velocities, so the residuals are those per unit of scale. The derivative by the
         scale contains that; else the fit would shrink the world to make them smaller.
         """
         step, before, durations = np.diff(motion.positions), nodes[:-1], np.diff(motion.times)
-        one = np.ones(len(starts))
+        one = np.ones(len(step))
         yaw = (before[:, YAW] + nodes[1:, YAW]) / 2.0
         turned_step = product(np.exp(1j * (before[:, DIRECTION] + yaw)), step)
         scaled = (1.0 + before[:, SCALE]) * turned_step
@@ -126,8 +127,8 @@ class DvlFactors(OdometryModel):
             by_angle = -part(1j * scaled)
             slopes = (one, -one, by_angle, -part(turned_step) - residual, by_angle / 2.0, by_angle / 2.0)
             slopes += (-durations,) * self._carriers
-            columns = (self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *carriers)
-            yield Residuals(starts[:, np.newaxis] + np.array(columns), np.column_stack(slopes), residual, weight)
+            columns = step_columns(nodes, self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *carriers)
+            yield Residuals(columns, np.column_stack(slopes), residual, weight)
 
 
 class ThrusterFactors(DvlFactors):

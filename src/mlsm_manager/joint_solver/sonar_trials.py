@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_trials import fit_from, reckoned
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.surface_points import SurfacePoints
+from mlsm_manager.joint_solver.surface_points import SurfacePoints, slants_of
 from mlsm_manager.joint_solver.velocity_models import AHEAD, TRAVEL
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.geometry import inverse, transformed
@@ -100,7 +100,7 @@ class SonarFault:
         normals = points.normals.copy()
         normals[wrong] = normals[wrong] @ np.linalg.inv(stretch)
         normals /= np.hypot(*normals.T)[:, np.newaxis]
-        slants = np.abs(places[:, 0] * normals[:, 1] - places[:, 1] * normals[:, 0])
+        slants = slants_of(places, normals)
         ranges, bearings = np.hypot(*places.T), np.arctan2(places[:, 1], places[:, 0])
         return replace(points, ranges=ranges, bearings=bearings, normals=normals, slants=slants)
 

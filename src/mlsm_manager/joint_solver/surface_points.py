@@ -38,7 +38,7 @@ class Sights(NamedTuple):
 
     @classmethod
     def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "Sights":
-        """Return those of a scan; sonar_in_base: (2,) m, where the sonar is in base_link."""
+        """sonar_in_base: (2,) m, where the sonar is in base_link."""
         places = transformed(inverse(scan.track.at(scan.times)), scan.points[:, :2]) - sonar_in_base
         ranges, bearings = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
         reach, per_echo = reaches(scan.times, bearings, ranges), points_per_echo(scan.times, ranges)
@@ -81,7 +81,7 @@ class SurfacePoints:
         normals = rotated(normals, -scan.track.at(scan.times)[:, 2])
         outward = np.einsum("na,na->n", normals, sight)
         normals = normals * np.where(outward < 0.0, -1.0, 1.0)[:, np.newaxis]
-        slants = np.abs(sight[:, 0] * normals[:, 1] - sight[:, 1] * normals[:, 0])
+        slants = slants_of(sight, normals)
         qualities = qualities * ramp(np.abs(outward) / np.maximum(ranges, _NOTHING), *_GRAZING)
         qualities = qualities / np.sqrt(per_echo)
         known = qualities > 0.0
@@ -145,6 +145,11 @@ def ramp(values: np.ndarray, zero: np.ndarray, one: np.ndarray) -> np.ndarray:
     return np.clip((values - zero) / (one - zero), 0.0, 1.0)
 
 
+def slants_of(sights: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """Return range times sine of incidence (n,) [m] of what is seen along `sights` (n, 2) [m] with `normals` (n, 2)."""
+    return np.abs(sights[:, 0] * normals[:, 1] - sights[:, 1] * normals[:, 0])
+
+
 _COUNTED = 6  # nearest points that are counted, the point included; more are no small thing
 _ALONE = (3.4, 2.4)  # points within reach, the point included: from too many for something small to few enough
 _EXTENDED = 3.0  # times the reach: so far a wall may go on with single echoes
@@ -152,9 +157,7 @@ _BESIDE = (1.0, 2.0)  # m beside the line of a wall: from an echo of the wall to
 _ASKEW = 0.1  # rad by which the line of a wall may be turned
 _STRONG = 1.5  # times Otsu's threshold of a scan: from there on an echo that stands alone is no speckle
 _MISTAKEN = (3.0, 12.0)  # m: from what is heard together in all scans to how far a vehicle goes in a turn of the head
-_OTHERS = (1.0, 0.3)
-"""Echoes of posts within these distances of each, on average: from too many to few enough. With (1.5, 0.5) clutter in a
-simulated canal was taken for posts in one of three runs; with these in none of six."""
+_OTHERS = (1.0, 0.3)  # echoes of posts within these distances of each, on average: from too many to few enough
 
 
 def post_points(scan: Scan, sights: Sights, surfaces: SurfacePoints) -> SurfacePoints:
@@ -166,9 +169,9 @@ def post_points(scan: Scan, sights: Sights, surfaces: SurfacePoints) -> SurfaceP
     sight, ranges, bearings, reach, per_echo = sights
     threshold = max(height_threshold(scan.points[:, 3]), _NOTHING)
     strong = ramp(scan.points[:, 3], threshold, _STRONG * threshold)
-    qualities = ramp(crowds(scan.points[:, :2], reach), *_ALONE) * strong
+    qualities = ramp(_crowds(scan.points[:, :2], reach), *_ALONE) * strong
     candidates = np.flatnonzero((qualities > 0.0) & (ranges > 0.0))
-    qualities[candidates] *= 1.0 - on_surfaces(sight[candidates], reach[candidates], surfaces)
+    qualities[candidates] *= 1.0 - _on_surfaces(sight[candidates], reach[candidates], surfaces)
     qualities = qualities * _distinctness(sight, qualities)
     qualities = qualities / np.sqrt(per_echo)
     normals = sight / np.maximum(ranges, _NOTHING)[:, np.newaxis]
@@ -190,7 +193,7 @@ def _distinctness(places: np.ndarray, qualities: np.ndarray) -> float:
     return float(ramp(np.array([others @ qualities[posts] / qualities[posts].sum()]), *_OTHERS)[0])
 
 
-def crowds(points: np.ndarray, reach: np.ndarray) -> np.ndarray:
+def _crowds(points: np.ndarray, reach: np.ndarray) -> np.ndarray:
     """Return how many points (n,) there are within `reach` (n,) [m] of each of `points` (n, 2), itself included."""
     count = min(_COUNTED, len(points))
     if not count:
@@ -200,7 +203,7 @@ def crowds(points: np.ndarray, reach: np.ndarray) -> np.ndarray:
     return ramp(distance, reach, _NEAR * reach).sum(axis=1)
 
 
-def on_surfaces(places: np.ndarray, reach: np.ndarray, surfaces: SurfacePoints) -> np.ndarray:
+def _on_surfaces(places: np.ndarray, reach: np.ndarray, surfaces: SurfacePoints) -> np.ndarray:
     """Return how much points at `places` (n, 2) [m] from the sonar lie where surfaces near them go on: (n,), 0 to 1.
 
     reach: (n,) m, within which neighbours on a surface are.

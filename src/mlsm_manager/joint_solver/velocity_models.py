@@ -13,6 +13,7 @@ from mlsm_manager.joint_solver.motion_models import (
     Drift,
     OdometryModel,
     changes_of,
+    step_columns,
 )
 from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, YAW, Layout, Residuals
 from mlsm_manager.joint_solver.odometry_log import Motion, as_complex, product, stretched
@@ -77,10 +78,12 @@ class HeadingFactors(OdometryModel):
         return np.zeros(self.width)
 
     def first_deviations(self) -> np.ndarray:
+        """Without a compass the first heading defines the map."""
         own, fixed = self._speeds, FIXED_DEVIATION * 10.0
+        heading = fixed if self.compass is None else self.compass.heading_deviation
         ahead = np.hypot(own.start_speed_deviation, own.speed_deviation)
         speeds = np.maximum([ahead, own.slip_deviation, own.start_speed_deviation], HELD_DEVIATION)
-        return np.concatenate([[fixed, fixed, self._first_heading()], speeds])
+        return np.concatenate([[fixed, fixed, heading], speeds])
 
     def reference(self, motion: Motion) -> np.ndarray:
         """The path of a vehicle that always goes ahead."""
@@ -115,14 +118,10 @@ class HeadingFactors(OdometryModel):
             np.array([own.speed_correlation_time, own.slip_correlation_time, np.inf]),
         )
 
-    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+    def steps(self, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
         durations, walks = np.diff(motion.times), {TRAVEL: self._speeds.travel_walk}
-        changes = changes_of(starts, nodes, motion.times, walks, self._changes(durations), self.compass)
-        ahead = self._speeds_ahead(starts, nodes, durations)
-        return [*self._positions(starts, nodes, motion), changes, ahead]
-
-    def _first_heading(self) -> float:
-        return self.compass.heading_deviation
+        changes = changes_of(nodes, motion.times, walks, self._changes(durations), self.compass)
+        return [*self._positions(nodes, motion), changes, self._speeds_ahead(nodes, durations)]
 
     def _kept(self, durations: np.ndarray) -> tuple:
         """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
@@ -134,27 +133,26 @@ class HeadingFactors(OdometryModel):
         _, slipping = self._kept(durations)
         return {ASIDE: Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))}
 
-    def _speeds_ahead(self, starts: np.ndarray, nodes: np.ndarray, durations: np.ndarray) -> Residuals:
+    def _speeds_ahead(self, nodes: np.ndarray, durations: np.ndarray) -> Residuals:
         own, (kept, _) = self._speeds, self._kept(durations)
-        columns = starts[:, np.newaxis] + np.array([self.width + AHEAD, AHEAD, TRAVEL])
-        jacobian = np.column_stack([np.ones(len(starts)), -kept, kept - 1.0])
+        columns = step_columns(nodes, self.width + AHEAD, AHEAD, TRAVEL)
+        jacobian = np.column_stack([np.ones(len(kept)), -kept, kept - 1.0])
         residual = nodes[1:, AHEAD] - kept * nodes[:-1, AHEAD] - (1.0 - kept) * nodes[:-1, TRAVEL]
         weight = 1.0 / np.maximum(own.speed_deviation**2 * (1.0 - kept**2), HELD_DEVIATION**2)
         return Residuals(columns, jacobian, residual, weight)
 
-    def _positions(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> Iterator[Residuals]:
+    def _positions(self, nodes: np.ndarray, motion: Motion) -> Iterator[Residuals]:
         yaw = (nodes[:-1, YAW] + nodes[1:, YAW]) / 2.0
         speeds = self.gain(nodes)
         ahead = product(np.exp(1j * yaw), np.diff(self.reference(motion)))
         step = product((speeds[:-1] + speeds[1:]) / 2.0, ahead)
         residual = np.diff(as_complex(nodes)) + np.diff(motion.positions) - step
         weight = 1.0 / (self._step_variance(np.diff(motion.times)) + _ROUNDING_VARIANCE)
-        one, own = np.ones(len(starts)), np.array([AHEAD, ASIDE, YAW])
+        one, own = np.ones(len(step)), np.array([AHEAD, ASIDE, YAW])
         for axis, part in ((0, np.real), (1, np.imag)):
-            places = np.concatenate([[self.width + axis, axis], own, self.width + own])
+            columns = step_columns(nodes, self.width + axis, axis, *own, *(self.width + own))
             by_node = [-part(ahead) / 2.0, -part(1j * ahead) / 2.0, -part(1j * step) / 2.0]
             jacobian = np.column_stack([one, -one, *by_node, *by_node])
-            columns = starts[:, np.newaxis] + places
             yield Residuals(columns, jacobian, part(residual), weight)
 
     def _step_variance(self, durations: np.ndarray) -> np.ndarray:
@@ -177,7 +175,6 @@ class UnaidedFactors(HeadingFactors):
     freed = None  # there is no compass that could be wrong
 
     def first_deviations(self) -> np.ndarray:
-        """The first heading defines the map."""
         return np.append(super().first_deviations(), self._own.turn_rate_deviation)
 
     def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
@@ -202,24 +199,20 @@ class UnaidedFactors(HeadingFactors):
         known = super().fading(node)
         return replace(known, times=np.append(known.times[:2], self._own.turn_rate_correlation_time))
 
-    def _first_heading(self) -> float:
-        return FIXED_DEVIATION * 10.0
-
     def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
         kept = np.exp(-durations / self._own.turn_rate_correlation_time)
         turn_rate = Change(kept, self._own.turn_rate_deviation**2 * (1.0 - kept**2))
         return {TURN_RATE: turn_rate, **super()._changes(durations)}
 
-    def steps(self, starts: np.ndarray, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
+    def steps(self, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
         own, durations = self._own, np.diff(motion.times)
-        places = np.array([self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE])
-        one, half = np.ones(len(starts)), durations / 2.0
+        columns = step_columns(nodes, self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE)
+        one, half = np.ones(len(durations)), durations / 2.0
         residual = np.diff(nodes[:, YAW]) - half * (nodes[1:, TURN_RATE] + nodes[:-1, TURN_RATE])
         short = np.minimum(durations**3 / (6.0 * own.turn_rate_correlation_time), durations**2)
         weight = 1.0 / (own.turn_rate_deviation**2 * short + own.heading_walk**2 * durations)
-        jacobian = np.column_stack([one, -one, -half, -half])
-        turn = Residuals(starts[:, np.newaxis] + places, jacobian, residual, weight)
-        return [*super().steps(starts, nodes, motion), turn]
+        turn = Residuals(columns, np.column_stack([one, -one, -half, -half]), residual, weight)
+        return [*super().steps(nodes, motion), turn]
 
 
 def _bridged(deviation: float, time: float, durations: np.ndarray) -> np.ndarray:

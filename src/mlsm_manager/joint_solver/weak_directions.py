@@ -78,14 +78,6 @@ class WeakDirections:
         return replace(points, normals=normals, qualities=points.qualities * ramp(lengths, *_FACING))
 
 
-def across_weak(
-    sets: Sequence[PlacedPoints], parameters: SolverParameters
-) -> Tuple[WeakDirections, Sequence[PlacedPoints]]:
-    """Return the weak directions of scans with points in `sets`, and these points without them; see both methods."""
-    weak = WeakDirections.of(sets, parameters)
-    return weak, [weak.without(points, points.scans) for points in sets]
-
-
 def _in_common(sums: np.ndarray) -> np.ndarray:
     """Return the weak directions (s, 2) that follow from `sums` (s, 2, 2) of information; like ones in a row share one.
 

@@ -13,12 +13,12 @@ from mlsm_manager.joint_solver.comparisons import (
     Neighbours,
     PostComparisons,
     add_comparisons,
-    met_with,
+    pairs_of,
     support,
     weighted,
 )
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.loops import Bend, Loop, add_loops
+from mlsm_manager.joint_solver.loops import Bend, Loop, pulls_of
 from mlsm_manager.joint_solver.map_support import agreement
 from mlsm_manager.joint_solver.motion_models import FIXED_DEVIATION
 from mlsm_manager.joint_solver.normal_equations import (
@@ -26,17 +26,17 @@ from mlsm_manager.joint_solver.normal_equations import (
     POSE,
     POSE_COLUMNS,
     RANGE_SCALE,
-    DenseSolution,
     EquationSolution,
     Layout,
     NormalEquations,
     State,
+    dense_solution,
     prior_of,
 )
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.weak_directions import across_weak
+from mlsm_manager.joint_solver.weak_directions import WeakDirections
 
 _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
 _FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
@@ -145,7 +145,7 @@ def joint_covariance(covariances: np.ndarray) -> np.ndarray:
 class Window:
     """Moves the free nodes of a solution and its run's unknowns in place; state: these and the frozen nodes."""
 
-    _solved: Callable[[NormalEquations], EquationSolution] = DenseSolution
+    _solved: Callable[[NormalEquations], EquationSolution] = staticmethod(dense_solution)
 
     def __init__(
         self,
@@ -169,7 +169,6 @@ class Window:
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
         self._held_covariance = self._covariance_of_frozen(covariances, first)
         self._recent_points = self._log.surfaces.heard(self._recent, last)
-        self._starts, self._newest_start = self._layout.step_starts, self._layout.run_start - self._layout.width
         self._motion = self._log.node_motion(np.arange(first, last + 1))
         self._mean, deviations = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
         held = self._layout.size + len(self._held_covariance) + np.arange(-POSE_COLUMNS, 0) if first else ()
@@ -213,10 +212,10 @@ class Window:
         cut = self._parameters.wide_cut
         for _ in range(_PULLED_STEPS if bend else 0):
             self.solve(cut, bend.loops, bend.start)
-            self._move(self._solution.step)
+            self._move()
         for _ in range(self._parameters.live_iterations):
             self.solve(cut)
-            self._move(self._solution.step)
+            self._move()
             cut = max(self._parameters.cut, _CUT_FACTOR * cut)
 
     def solve(self, cut: float, loops: Sequence[Loop] = (), start: Optional[State] = None) -> NormalEquations:
@@ -231,9 +230,11 @@ class Window:
         add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:
             self._posts.add(equations, self._layout, self._run.placed(self._posts.points), cut)
-        self._prior.add(equations, self._newest_start, self.state.nodes[-1], self._own_covariance)
-        add_loops(equations, self._layout, loops, self.state.nodes, start)
-        self._solution = type(self)._solved(equations)
+        newest = self._layout.node_start(self._layout.last)
+        self._prior.add(equations, newest, self.state.nodes[-1], self._own_covariance)
+        if loops:
+            equations.add(*pulls_of(loops, self._layout, self.state.nodes, start))
+        self._solution = self._solved(equations)
         return equations
 
     def _own_covariance(self, columns: np.ndarray) -> np.ndarray:
@@ -246,7 +247,7 @@ class Window:
         off = np.append(self.state.nodes[first], self.state.run) - self._mean
         if first:
             off[POSE] = 0.0
-        steps = self._odometry.steps(self._starts, self.state.nodes[first:], self._motion)
+        steps = self._odometry.steps(self.state.nodes[first:], self._motion)
         equations.add(self._believed._replace(values=off), *steps)
         return equations
 
@@ -281,10 +282,13 @@ class Window:
         """
         parameters = self._parameters
         placed = self._frozen.moved_by_run(self.state.run), self._run.placed(self._recent_points)
-        weak, (frozen, recent) = across_weak(placed, parameters)
+        weak = WeakDirections.of(placed, parameters)
+        surfaces = [weak.without(points, points.scans) for points in placed]
+        recent = surfaces[1]
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        self._lists = self._lists or [Neighbours(one, self._frozen.group_scans) for one in (frozen, recent)]
-        met = met_with(self._lists, sources, (frozen, recent), cut, parameters)
+        self._lists = self._lists or [Neighbours(points, self._frozen.group_scans) for points in surfaces]
+        pairs = [pairs_of(own, sources, points, cut, parameters) for own, points in zip(self._lists, surfaces)]
+        met = [(one, sources, points) for one, points in zip(pairs, surfaces)]
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])
@@ -293,12 +297,14 @@ class Window:
         to_frozen, *others = self._met
         return [(weighted(to_frozen[0], self._frozen.importance), *to_frozen[1:]), *others]
 
-    def _move(self, step: np.ndarray) -> None:
-        run_start = self._layout.run_start
-        nodes = step[:run_start].reshape(-1, self._layout.width)
-        self.state.nodes[self._layout.first :] += nodes
+    def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
+        return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)
+
+    def _move(self) -> None:
+        step = self._solution.step
+        self.state.nodes[self._layout.first :] += self._nodes_of(step)
         for column, most in _MOST_RUN_STEP.items():
-            self.state.run[column] += np.clip(step[run_start + column], -most, most)
+            self.state.run[column] += np.clip(step[self._layout.run_start + column], -most, most)
 
     def log_likelihood(self) -> float:
         """Return that of the free nodes: of echoes on surfaces, less that of odd motions."""

@@ -12,7 +12,7 @@ from made_posts import heard
 
 from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
 from mlsm_manager.joint_solver.estimate import LiveEstimate
-from mlsm_manager.joint_solver.normal_equations import DenseSolution, NormalEquations, Residuals, SparseSolution
+from mlsm_manager.joint_solver.normal_equations import NormalEquations, Residuals, dense_solution, sparse_solution
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of, stacked, unstacked
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
@@ -82,13 +82,13 @@ def test_dense_and_sparse_solutions_agree():
     equations = NormalEquations(8)
     columns = rng.randint(0, 8, (40, 3))
     equations.add(Residuals(columns, rng.normal(size=(40, 3)), rng.normal(size=40), rng.uniform(0.5, 2.0, 40)))
-    np.testing.assert_allclose(DenseSolution(equations).step, SparseSolution(equations).step, rtol=1e-6)
+    np.testing.assert_allclose(dense_solution(equations).step, sparse_solution(equations).step, rtol=1e-6)
 
 
 def test_an_error_of_what_is_held_passes_on_to_what_hangs_on_it():
     equations = NormalEquations(1, held=1)
     equations.add(Residuals(np.array([[0, 1]]), np.array([[1.0, -1.0]]), np.zeros(1), np.array([4.0])))
-    solution = DenseSolution(equations)
+    solution = dense_solution(equations)
     assert solution.covariances(np.array([[0]]), np.array([[9.0]]))[0][0, 0, 0] == pytest.approx(0.25 + 9.0)
 
 

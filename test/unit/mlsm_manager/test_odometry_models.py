@@ -50,10 +50,9 @@ def step_of_motion(node):
     return Motion(TIMES[rows], POSES[rows], MOTION.ahead[rows], MOTION.held[rows])
 
 
-def equations_of(model, nodes):
-    layout = Layout(0, 2, model.width)
-    equations = NormalEquations(layout.size)
-    equations.add(*model.steps(layout.step_starts, nodes, MOTION))
+def equations_of(model, nodes, motion=MOTION):
+    equations = NormalEquations(Layout(0, 2, model.width).size)
+    equations.add(*model.steps(nodes, motion))
     return equations
 
 
@@ -106,9 +105,8 @@ def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
     elsewhere = nodes.copy()
     elsewhere[:, :2] += POSES[:, :2] - positions
     other = Motion(TIMES, np.column_stack([positions, POSES[:, 2]]), MOTION.ahead, MOTION.held)
-    there = NormalEquations(Layout(0, 2, model.width).size)
-    there.add(*model.steps(Layout(0, 2, model.width).step_starts, elsewhere, other))
-    np.testing.assert_allclose(there.gradient, equations_of(model, nodes).gradient, rtol=1e-9, atol=1e-9)
+    there, here = equations_of(model, elsewhere, other), equations_of(model, nodes)
+    np.testing.assert_allclose(there.gradient, here.gradient, rtol=1e-9, atol=1e-9)
 
 
 def test_ahead_is_where_a_vehicle_would_be_that_always_went_ahead():
@@ -150,9 +148,7 @@ def test_while_positions_are_held_nobody_knows_how_far_the_vehicle_goes(kind):
     model = model_of(kind)
     nodes = model.first_node() + np.array([[0.0], [4.0], [4.0]]) * np.eye(model.width)[0]
     held = Motion(TIMES, POSES, MOTION.ahead, np.array([0.0, 14.0, 14.0]))
-    reported, told = NormalEquations(Layout(0, 2, model.width).size), equations_of(model, nodes)
-    reported.add(*model.steps(Layout(0, 2, model.width).step_starts, nodes, held))
-    assert told.cost > 5.0 * reported.cost
+    assert equations_of(model, nodes).cost > 5.0 * equations_of(model, nodes, held).cost
 
 
 @pytest.fixture(scope="module")

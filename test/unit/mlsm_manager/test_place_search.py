@@ -12,9 +12,8 @@ from mlsm_manager.joint_solver.compiled_comparisons import Pairs
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import misfit_variances, shares_heard_before
-from mlsm_manager.joint_solver.motion_models import Transition
 from mlsm_manager.joint_solver.normal_equations import YAW, State
-from mlsm_manager.joint_solver.places import searched_node
+from mlsm_manager.joint_solver.places import covariance_since, searched_node
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import solved_path
 from node_support.geometry import transformed
@@ -64,11 +63,10 @@ def test_a_motion_that_is_known_is_not_searched(log):
 
 
 def test_a_speed_that_is_unknown_makes_a_step_unknown(log):
-    motion, nodes = log.node_motion(np.array([1, 2])), np.zeros((2, HEADING.width))
-    transition = Transition.of(HEADING, nodes, motion)
-    at_rest = transition.step_covariance(np.zeros((6, 6)))
-    moving = transition.step_covariance(np.diag([9.0, 9.0, 9.0, 0.3, 0.0, 0.3]) ** 2)
-    seconds = motion.times[1] - motion.times[0]
+    solution = solution_of(log, HEADING, state_with(log, HEADING, np.zeros(2)))
+    at_rest = covariance_since(solution, np.zeros((6, 6)), 0)
+    moving = covariance_since(solution, np.diag([9.0, 9.0, 9.0, 0.3, 0.0, 0.3]) ** 2, 0)
+    seconds = np.diff(log.node_times)[-1]
     added = np.sqrt(np.trace(moving[:2, :2] - at_rest[:2, :2]))
     assert 0.7 * 0.3 * seconds < added < 0.3 * seconds
 
