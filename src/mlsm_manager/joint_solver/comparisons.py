@@ -8,16 +8,7 @@ from typing import Iterable, Iterator, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.joint_solver.compiled_comparisons import (
-    POINT_COLUMNS,
-    Limits,
-    Noise,
-    Packed,
-    Pairs,
-    Surfaces,
-    summed_comparisons,
-    weighed_pairs,
-)
+from mlsm_manager.joint_solver.compiled_comparisons import POINT_COLUMNS, Pairs, summed_comparisons, weighed_pairs
 from mlsm_manager.joint_solver.compiled_neighbours import shared_neighbours
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS, Layout, NormalEquations
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -67,8 +58,8 @@ def pairs_of(
     Points of one scan are never compared with each other, nor surfaces that face different ways. In its own group, a
     point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
     """
-    own, others = (Surfaces(np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
-    limits = Limits(cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
+    own, others = ((np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
+    limits = (cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
     return weighed_pairs(lists.within(sources, targets, cut), own, others, limits)
 
 
@@ -105,22 +96,21 @@ def summed(
     whose sources are of one scan must follow each other.
 
     Noise is one of the reported ranges. The residuals are therefore those per unit of range scale, which the
-    derivative by it contains; else the fit would shrink the world to make them smaller. A beam that meets a surface
-    aslant may have heard it anywhere in its width: such a point is less certain. The kernel is Geman and McClure's
-    (1985), wider while the cut is.
+    derivative by it contains; else the fit would shrink the world to make them smaller. The kernel is Geman and
+    McClure's (1985), wider while the cut is.
     """
     own = _packed(sources)
     others = own if targets is sources else _packed(targets)
     widening = max(1.0, cut / parameters.cut)
-    noise = Noise(parameters.echo_deviation**2, parameters.beam_half_width**2, parameters.weight)
+    noise = (parameters.echo_deviation**2, parameters.beam_half_width**2, parameters.weight)
     return summed_comparisons(tuple(pairs), own, others, noise, widening)
 
 
-def _packed(points: PlacedPoints) -> Packed:
+def _packed(points: PlacedPoints) -> Tuple[np.ndarray, np.ndarray]:
     rows = np.empty((len(points.scans), POINT_COLUMNS))
     rows[:, 0:2], rows[:, 2:4], rows[:, 4:6] = points.places, points.arms, points.normals
     rows[:, 6], rows[:, 7], rows[:, 8:12] = points.slants, points.shares, points.by_run.reshape(-1, 4)
-    return Packed(rows, points.scans)
+    return rows, points.scans
 
 
 def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters) -> float:

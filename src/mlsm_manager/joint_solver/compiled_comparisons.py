@@ -23,50 +23,9 @@ class Pairs(NamedTuple):
     importance: np.ndarray
 
 
-class Surfaces(NamedTuple):
-    """What n points lie on: normals (n, 2), and how well they are known (n,)."""
-
-    normals: np.ndarray
-    quality: np.ndarray
-
-
-class Limits(NamedTuple):
-    """Pairs count up to `near` [m] fully, and less up to `cut` [m].
-
-    Likewise from a cosine of `full` between both normals on, and less from `least`.
-    """
-
-    cut: float
-    near: float
-    least: float
-    full: float
-
-
-class Packed(NamedTuple):
-    """Points (n, POINT_COLUMNS), and which scans (n,) heard them."""
-
-    points: np.ndarray
-    scans: np.ndarray
-
-
-class Noise(NamedTuple):
-    """The variance of a comparison is `variance` + `by_slant` * (sum of both squared slants).
-
-    weight: of each comparison, for neighbours share errors.
-    """
-
-    variance: float
-    by_slant: float
-    weight: float
-
-
 _ROWS, _VALUES, _TABLE = int64[::1], float64[::1], float64[:, ::1]
-# No two have members of the same types: numba 0.48 takes one for the other.
 _PAIRS = types.NamedTuple((_ROWS, _ROWS, _VALUES), Pairs)
-_SURFACES = types.NamedTuple((_TABLE, _VALUES), Surfaces)
-_LIMITS = types.NamedUniTuple(float64, 4, Limits)
-_PACKED = types.NamedTuple((_TABLE, _ROWS), Packed)
-_NOISE = types.NamedUniTuple(float64, 3, Noise)
+_SURFACES, _PACKED = types.Tuple((_TABLE, _VALUES)), types.Tuple((_TABLE, _ROWS))
 
 
 @compiled()
@@ -75,18 +34,26 @@ def _ramp(value, zero, one):
     return min(max((value - zero) / (one - zero), 0.0), 1.0)
 
 
-@compiled(_PAIRS(types.Tuple((_ROWS, _ROWS, _VALUES, _VALUES)), _SURFACES, _SURFACES, _LIMITS), error_model="numpy")
+@compiled(
+    _PAIRS(types.Tuple((_ROWS, _ROWS, _VALUES, _VALUES)), _SURFACES, _SURFACES, types.UniTuple(float64, 4)),
+    error_model="numpy",
+)
 def weighed_pairs(found, sources, targets, limits):
-    """Return the comparisons that count; see comparisons.pairs_of. found: what Neighbours.within returns."""
+    """Return the comparisons that count; see comparisons.pairs_of. found: what Neighbours.within returns.
+
+    sources, targets: normals (n, 2) of points, and how well they are known (n,). limits: distance [m] from which on
+    pairs do not count, and up to which they count fully; likewise the cosines between both normals.
+    """
     rows, neighbours, distances, shares = found
+    (normals, qualities), (other_normals, other_qualities), (cut, near, least, full) = sources, targets, limits
     own, met, importance = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64), np.empty(len(rows))
     made = 0
     for pair in range(len(rows)):
         i, j = rows[pair], neighbours[pair]
-        cosine = sources.normals[i, 0] * targets.normals[j, 0] + sources.normals[i, 1] * targets.normals[j, 1]
-        faded = _ramp(distances[pair], limits.cut, limits.near)
-        faded *= _ramp(cosine, limits.least, limits.full)
-        weight = shares[pair] * faded * sources.quality[i] * targets.quality[j]
+        cosine = normals[i, 0] * other_normals[j, 0] + normals[i, 1] * other_normals[j, 1]
+        faded = _ramp(distances[pair], cut, near)
+        faded *= _ramp(cosine, least, full)
+        weight = shares[pair] * faded * qualities[i] * other_qualities[j]
         if weight > 0.0:
             own[made], met[made], importance[made] = i, j, weight
             made += 1
@@ -96,8 +63,7 @@ def weighed_pairs(found, sources, targets, limits):
 X, Y, ARM_X, ARM_Y, NORMAL_X, NORMAL_Y, SLANT, SHARE, BY_SCALE_X, BY_DELAY_X, BY_SCALE_Y, BY_DELAY_Y = range(12)
 """Columns of a packed point."""
 POINT_COLUMNS = 12
-PAIR_COLUMNS = 14
-"""Of the poses of a source's two nodes, of those of the target's two, and of the run's unknowns."""
+_PAIR_COLUMNS = 14  # of the poses of a source's two nodes, of those of the target's two, and of the run's unknowns
 
 
 @compiled()
@@ -169,7 +135,7 @@ def _write_sums(slopes, residuals, weights, information, gradient):
 
     A row is summed in variables, not in an array: so the compiler keeps it in registers, three times as fast.
     """
-    for row in range(PAIR_COLUMNS):
+    for row in range(_PAIR_COLUMNS):
         s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = s8 = s9 = s10 = s11 = s12 = s13 = by_residual = 0.0
         for pair in range(len(slopes)):
             own = slopes[pair]
@@ -196,31 +162,34 @@ def _write_sums(slopes, residuals, weights, information, gradient):
 
 @compiled(
     types.Tuple((_ROWS, _ROWS, float64[:, :, ::1], _TABLE))(
-        types.Tuple((_ROWS, _ROWS, _VALUES)), _PACKED, _PACKED, _NOISE, float64
+        types.Tuple((_ROWS, _ROWS, _VALUES)), _PACKED, _PACKED, types.UniTuple(float64, 3), float64
     ),
     error_model="numpy",
 )
 def summed_comparisons(pairs, sources, targets, noise, widening):
-    """Return both scans (g,), information (g, c, c) and gradient (g, c) of each pair of scans; c is PAIR_COLUMNS.
+    """Return both scans (g,), information (g, c, c) and gradient (g, c) of each pair of scans; c is _PAIR_COLUMNS.
 
-    pairs: members of Pairs; those whose sources are of one scan follow each other. widening: of the robust kernel.
+    pairs: members of Pairs; those whose sources are of one scan follow each other. sources, targets: packed points, and
+    which scans heard them. noise: the variance of a comparison is its first member, and its second one times the sum of
+    both squared slants; the third one is the weight of each. widening: of the robust kernel.
     """
-    rows, neighbours, importance = pairs
-    group_of, scans, other_scans = _groups_of(rows, neighbours, sources.scans, targets.scans)
+    (rows, neighbours, importance), (points, source_scans), (other_points, target_scans) = pairs, sources, targets
+    constant, by_slant, whole_weight = noise
+    group_of, scans, other_scans = _groups_of(rows, neighbours, source_scans, target_scans)
     order, starts = _grouped(group_of, len(scans))
     most = (starts[1:] - starts[:-1]).max() if len(scans) else 0
-    slopes, residuals, weights = np.empty((most, PAIR_COLUMNS)), np.empty(most), np.empty(most)
-    information, gradient = np.empty((len(scans), PAIR_COLUMNS, PAIR_COLUMNS)), np.empty((len(scans), PAIR_COLUMNS))
+    slopes, residuals, weights = np.empty((most, _PAIR_COLUMNS)), np.empty(most), np.empty(most)
+    information, gradient = np.empty((len(scans), _PAIR_COLUMNS, _PAIR_COLUMNS)), np.empty((len(scans), _PAIR_COLUMNS))
     for group in range(len(scans)):
         own = order[starts[group] : starts[group + 1]]
         for place in range(len(own)):
             pair = own[place]
-            source, target = sources.points[rows[pair]], targets.points[neighbours[pair]]
+            source, target = points[rows[pair]], other_points[neighbours[pair]]
             residual = _write_slopes(source, target, slopes[place])
             slants = source[SLANT] * source[SLANT] + target[SLANT] * target[SLANT]
-            variance = noise.variance + noise.by_slant * slants
+            variance = constant + by_slant * slants
             kernel = 1.0 + residual * residual / variance / (widening * widening)
-            weights[place] = noise.weight / variance / (kernel * kernel) * importance[pair]
+            weights[place] = whole_weight / variance / (kernel * kernel) * importance[pair]
             residuals[place] = residual
         _write_sums(slopes[: len(own)], residuals, weights, information[group], gradient[group])
     return scans, other_scans, information, gradient

@@ -20,8 +20,7 @@ from mlsm_manager.joint_solver.window import Window, superfluous
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
-ODOMETRY = "odometry"
-"""Name under which the name of a run's model is stored."""
+ODOMETRY = "odometry"  # under which the name of a run's model is stored
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
 _FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
@@ -37,18 +36,13 @@ class LiveSolver:
     """
 
     def __init__(
-        self,
-        parameters: SolverParameters,
-        log: RunLog,
-        start: Optional[np.ndarray] = None,
+        self, parameters: SolverParameters, log: RunLog, start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
-    ) -> None:
+    ) -> None:  # fmt: skip
         """`log`: without scans. `start`: (3,) standard deviations of the first pose in the map, m, m, rad; None: it
         defines the map. `known`: surfaces that the map has already.
         """
-        self.parameters = parameters
-        self.log = log
-        self.odometry = parameters.odometry
+        self.parameters, self.log, self.odometry = parameters, log, parameters.odometry
         self.estimates: List[Optional[LiveEstimate]] = []
         self.state = State(self.odometry.first_node()[np.newaxis], parameters.run_mean(log))
         self._frozen = FrozenPlaces(np.empty((0, POSE_COLUMNS, POSE_COLUMNS)), np.empty(0))
@@ -89,30 +83,25 @@ class LiveSolver:
             raise ValueError(
                 f"it was stored with another odometry profile: {name}, not {type(parameters.odometry).__name__}"
             )
-        start, known = stored["start"], stored["known"]
+        start, known, scans = stored["start"], stored["known"], log.scan_count
         solver = cls(parameters, log, start if len(start) else None, KnownSurfaces(known) if len(known) else None)
         solver._may_bend = False  # the map that was stored with it is not drawn anew
-        solver._restore(stored)
-        solver.submaps = Submaps(stored[_SUBMAPS])
-        solver.fixes = Fixes.of_arrays(stored)
+        nodes, covariances = stored["nodes"], stored["node_covariances"]
+        if nodes.shape != (scans + 1, solver.odometry.width) or covariances.shape[1:] != (POSE_COLUMNS, POSE_COLUMNS):
+            raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {scans} scans")
+        solver.state = State(nodes, stored["run_unknowns"]).copy()
+        solver._frozen = FrozenPlaces(covariances, stored["misfits"])
+        solver.submaps, solver.fixes = Submaps(stored[_SUBMAPS]), Fixes.of_arrays(stored)
         if solver._by_parts is not None:
-            solver._by_parts = solver._by_parts.resumed(solver.log, parameters, stored)
+            solver._by_parts = solver._by_parts.resumed(log, parameters, stored)
         solver.estimates += unstacked(LiveEstimate, stored, _ESTIMATE)
         for name, found in (("estimates", solver.estimates), ("submaps", stored[_SUBMAPS])):
-            if len(found) != solver.log.scan_count:
-                raise ValueError(f"{len(found)} {name} for {solver.log.scan_count} scans")
+            if len(found) != scans:
+                raise ValueError(f"{len(found)} {name} for {scans} scans")
         return solver
 
-    def _restore(self, stored: Mapping[str, np.ndarray]) -> None:
-        nodes, covariances, scans = stored["nodes"], stored["node_covariances"], self.log.scan_count
-        width = self.state.nodes.shape[1]
-        if nodes.shape != (scans + 1, width) or covariances.shape[1:] != (POSE_COLUMNS, POSE_COLUMNS):
-            raise ValueError(f"nodes {nodes.shape}, covariances {covariances.shape} for {scans} scans")
-        self.state = State(nodes, stored["run_unknowns"]).copy()
-        self._frozen = FrozenPlaces(covariances, stored["misfits"])
-
     def begun_with(self, parameters: SolverParameters, log: RunLog) -> "LiveSolver":
-        """Return a solver with other parameters that begins where this one began; log: without scans."""
+        """Return one that begins where this one began; log: without scans."""
         return LiveSolver(parameters, log, self._start, self._known)
 
     @property
@@ -152,9 +141,7 @@ class LiveSolver:
         return float(self.estimates[-1].deviations[SCALE])
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
-        """Put the next scan into the log, and return what `solve` says of it.
-
-        It may be cut into parts (`parts_per_turn`), each then a scan of the log with an estimate of its own.
+        """Put the next scan, or its parts (`parts_per_turn`), into the log, and return what `solve` says of it.
 
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.
@@ -172,9 +159,8 @@ class LiveSolver:
     def solve(self, fix: Optional[Fix] = None) -> LiveEstimate:
         """Return where the vehicle was at the end of the newest scan of the log, as known from all of them.
 
-        fix: where the scan alone was found in the map, where somebody looked.
-
-        Raises RefusedInput, and stays as it is, where the fit has no finite solution.
+        fix: where the scan alone was found in the map, where somebody looked. Raises RefusedInput, and stays as it is,
+        where the fit has no finite solution.
         """
         scans, before, by_parts, loops = len(self.estimates), self.state.copy(), self._by_parts, self._loops
         self._silent = silent_before(self.log, self.log.scan_count - 1)
@@ -210,7 +196,8 @@ class LiveSolver:
         if fix is None:
             self._search()
         else:
-            self._start_at(fix)
+            self.fixes.by_node[self.log.scan_count] = fix
+            state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([self.log.scan_count]))[0, :YAW]
         window = self._fitted()
         if self.submaps.is_apart:
             self.search = put_submap(self.solution, window.estimates(1)[0].covariance[:2, :2])
@@ -235,7 +222,6 @@ class LiveSolver:
         return max(self.log.scan_count - kept, 0) // _FORGOTTEN_AT_ONCE * _FORGOTTEN_AT_ONCE
 
     def _forget_old(self) -> None:
-        """Forget what no later scan needs."""
         old = self._old_scans
         if old <= self._forgotten_until:
             return
@@ -243,11 +229,6 @@ class LiveSolver:
         self.log.forget(superfluous(self.solution, *groups))
         self.log.thin_odometry(old)
         self._forgotten_until = old
-
-    def _start_at(self, fix: Fix) -> None:
-        node = self.log.scan_count
-        self.fixes.by_node[node] = fix
-        self.state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([node]))[0, :YAW]
 
     def _fitted(self, bend: Optional[Bend] = None) -> Window:
         """Return the newest nodes' problem after they were moved to its solution; loops only pull them near."""
@@ -263,10 +244,12 @@ class LiveSolver:
         loops = confirmed(self._loops, self.log.scan_count - 1)
         if not loops:
             return window
-        now, before = self.state, window.log_likelihood()
+        now, before, found = self.state, window.log_likelihood(), []
         places = self._frozen.places(window.oldest, window.covariances_of_oldest(0))
         bend = Bend.of(loops, now, places)
-        found = [self._bent(bend, share) for share in bend.tried]
+        for share in bend.tried:
+            self.state = bend.state(share)
+            found.append((self._fitted(bend).log_likelihood() - bend.cost(share), share, self.state))
         likelihood, share, state = max(found, key=lambda one: one[0])
         if likelihood < before + CONVINCING:
             self.state = now
@@ -276,15 +259,8 @@ class LiveSolver:
         self._loops = ()
         self.fixes = Fixes()  # in the map as it was
         seconds = self.log.node_times[-1] - self.log.node_times[loops[-1].older + 1]
-        shift = state.nodes[-1, :2] - now.nodes[-1, :2]
-        self.closed = ClosedLoop(float(seconds), shift)
+        self.closed = ClosedLoop(float(seconds), state.nodes[-1, :2] - now.nodes[-1, :2])
         return self._fitted()
-
-    def _bent(self, bend: Bend, share: float) -> Tuple[float, float, State]:
-        """Return the log likelihood of the run with the path before the window bent by a `share`, that and the fit."""
-        self.state = bend.state(share)
-        window = self._fitted(bend)
-        return window.log_likelihood() - bend.cost(share), share, self.state
 
     @property
     def found(self) -> str:

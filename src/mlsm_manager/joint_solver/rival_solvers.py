@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Fix
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
 _OTHER = "rival."  # before the names in stored maps
@@ -71,10 +71,6 @@ class RivalSolvers:
     @property
     def solvers(self) -> List[LiveSolver]:
         return [solver for solver in (self.shown, self.other) if solver is not None]
-
-    def follow(self, track: Track, time: float) -> None:
-        """Learn the odometry up to `time` [s], which `track` holds."""
-        self.shown.log.odometry.extend(track, time)
 
     def stored(self) -> Dict[str, np.ndarray]:
         """Return all but the scans that `resumed` needs; see LiveSolver.stored."""

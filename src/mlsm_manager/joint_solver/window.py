@@ -41,66 +41,49 @@ from mlsm_manager.joint_solver.weak_directions import WeakDirections
 _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
 _FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
 _NO_DISTANCE = 1e-9  # m: keeps groups at one place from dividing by zero
+# Inflates the earlier deviation of the delay: frozen scans keep the delay they were frozen with, so comparing with them
+# overstates what is known.
 _FORGOTTEN_DELAY = 2.0
-"""Inflates the earlier deviation of the delay. Frozen scans keep the delay they were frozen with, so comparing with
-them overstates what is known: windows 41 scans apart settled on 0.68 and 0.86 s where the whole run gives 1.00 s."""
 _CUT_FACTOR = 0.7  # the cut shrinks so much from step to step
 _PULLED_STEPS = 5  # with the pull of loops: comparisons meet by then
 _MOST_RUN_STEP = {RANGE_SCALE: 0.02, DELAY: 0.3}  # a far-off linearisation cannot throw the calibration away
-_NOTHING_FROZEN = np.empty((0, POSE_COLUMNS, POSE_COLUMNS))
 
 
 @dataclass(frozen=True)
 class FrozenMap:
     """Points of frozen groups of scans, placed with the run's unknowns at `run` (2,).
 
-    importance: (n,) factor of each point's weight, 0 at the border of what is near.
-    numbers: (b,) the groups that are near, in the order of time. group_importance: (b,) the factor of each.
-    group_scans: in each group, the first of which begins with the run.
+    importance: (n,) factor of each point's weight, 0 at the border of what is near. numbers: (b,) the groups that are
+    near, in the order of time. scans: (b, k) int, of each. group_importance: (b,) the factor of each.
     """
 
     points: PlacedPoints
     importance: np.ndarray
     numbers: np.ndarray
+    scans: np.ndarray
     group_importance: np.ndarray
-    group_scans: int
     run: np.ndarray
-
-    @property
-    def scans(self) -> np.ndarray:
-        """(b, group_scans) int, the scans of each group that is near."""
-        return _scans_of(self.numbers, self.group_scans)
-
-    def moved_by_run(self, run: np.ndarray) -> PlacedPoints:
-        """Return the points with the run's unknowns at `run` (2,), to first order."""
-        return replace(self.points, places=self.points.places + self.points.by_run @ (run - self.run))
-
-
-def _scans_of(groups: np.ndarray, group_scans: int) -> np.ndarray:
-    return groups[:, np.newaxis] * group_scans + np.arange(group_scans)
 
 
 def nearest_groups(solution: Solution, before: int) -> FrozenMap:
     """Return the groups of scans nearest to the newest node among those that end before scan `before`."""
-    log, scans = solution.log, solution.parameters.group_scans
-    count = before // scans
-    known = np.flatnonzero(~log.forgotten[: count * scans : scans])
-    places = solution.node_places(np.append(known * scans + scans // 2, log.scan_count))
+    log, each = solution.log, solution.parameters.group_scans
+    count = before // each
+    known = np.flatnonzero(~log.forgotten[: count * each : each])
+    places = solution.node_places(np.append(known * each + each // 2, log.scan_count))
     distances = np.hypot(*(places[:-1] - places[-1]).T)
     distances = distances + _AGE_DISTANCE * known / max(count, 1)
     importance = np.zeros(count)
     importance[known] = fading(distances, solution.parameters.frozen_groups)
     numbers = np.flatnonzero(importance > 0.0)
-    rows, _ = log.surfaces.rows_of(_scans_of(numbers, scans).ravel())
-    points = solution.placed(log.surfaces.points(rows))
-    per_point = importance[points.scans // scans] if len(rows) else np.empty(0)
-    return FrozenMap(points, per_point, numbers, importance[numbers], scans, solution.state.run.copy())
+    scans = numbers[:, np.newaxis] * each + np.arange(each)
+    points = solution.placed(log.surfaces.points(log.surfaces.rows_of(scans.ravel())[0]))
+    per_point = importance[points.scans // each]
+    return FrozenMap(points, per_point, numbers, scans, importance[numbers], solution.state.run.copy())
 
 
-_BESIDE = 5.0
-"""m between the places of groups that hear the same."""
-_ENOUGH_BESIDE = 0.25
-"""Of the groups that a scan is compared with: so many that hear the same hold the map."""
+_BESIDE = 5.0  # m between the places of groups that hear the same
+_ENOUGH_BESIDE = 0.25  # of the groups that a scan is compared with: so many that hear the same hold the map
 
 
 def superfluous(solution: Solution, first: int, last: int) -> np.ndarray:
@@ -148,26 +131,23 @@ class Window:
     _solved: Callable[[NormalEquations], EquationSolution] = staticmethod(dense_solution)
 
     def __init__(
-        self,
-        solution: Solution,
-        free_nodes: int,
-        estimates: Sequence[LiveEstimate] = (),
-        covariances: np.ndarray = _NOTHING_FROZEN,
-        start: Optional[np.ndarray] = None,
-    ) -> None:
+        self, solution: Solution, free_nodes: int, estimates: Sequence[LiveEstimate] = (),
+        covariances: Optional[np.ndarray] = None, start: Optional[np.ndarray] = None,
+    ) -> None:  # fmt: skip
         """free_nodes: how many of the newest nodes may move besides the one before them; all others are frozen.
 
         estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, at least as many as there
-        are. start: (3,) standard deviations of the first node's pose, None where it defines the map.
+        are, if any. start: (3,) standard deviations of the first node's pose, None where it defines the map.
         """
         self._run, self._log, self.state = solution, solution.log, solution.state
         self._odometry, self._parameters = solution.parameters.odometry, solution.parameters
         last = self._log.scan_count
         first = max(0, last - free_nodes)
         self._frozen = nearest_groups(solution, first)
-        self._recent = first - first % self._frozen.group_scans
+        self._recent = first - first % self._parameters.group_scans
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
-        self._held_covariance = self._covariance_of_frozen(covariances, first)
+        middles = np.append(self._frozen.scans[:, self._parameters.group_scans // 2], first)
+        self._held_covariance = joint_covariance(covariances[middles]) if first else np.zeros((0, 0))
         self._recent_points = self._log.surfaces.heard(self._recent, last)
         self._motion = self._log.node_motion(np.arange(first, last + 1))
         self._mean, deviations = self._beliefs_of(estimates[first - 1]) if first else self._beliefs_before(start)
@@ -185,27 +165,18 @@ class Window:
         """Return those with the frozen groups and with the scans since; None where posts are ignored."""
         if not self._parameters.post_confidence:
             return None
-        groups = self._frozen.scans
         recent = np.arange(self._recent, self._layout.last)
-        importance = np.repeat(self._frozen.group_importance, self._frozen.group_scans)
-        scans, importance = np.append(groups, recent), np.append(importance, np.ones(len(recent)))
+        importance = np.repeat(self._frozen.group_importance, self._parameters.group_scans)
+        scans, importance = np.append(self._frozen.scans, recent), np.append(importance, np.ones(len(recent)))
         same = self._run.submaps.numbers[scans] == self._run.submaps.newest
-        scans, importance = scans[same], importance[same]
-        return PostComparisons(self._log.posts, self._parameters, scans, importance)
+        return PostComparisons(self._log.posts, self._parameters, scans[same], importance[same])
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its group's, and one more for nodes beside the window."""
-        number_of_group = np.full(first // self._frozen.group_scans + 1, -1)
+        number_of_group = np.full(first // self._parameters.group_scans + 1, -1)
         number_of_group[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
         number_of_group[-1] = len(self._frozen.numbers)
-        return number_of_group[np.arange(first) // self._frozen.group_scans]
-
-    def _covariance_of_frozen(self, covariances: np.ndarray, first: int) -> np.ndarray:
-        """Return (3 g, 3 g) of the groups' poses."""
-        if not first:
-            return np.zeros((0, 0))
-        middles = self._frozen.scans[:, self._frozen.group_scans // 2]
-        return joint_covariance(covariances[np.append(middles, first)])
+        return number_of_group[np.arange(first) // self._parameters.group_scans]
 
     def fit(self, bend: Optional[Bend] = None) -> None:
         """Move the free nodes to the solution; the loops of a bend only pull them near."""
@@ -280,13 +251,15 @@ class Window:
 
         Neighbours are looked up once for all steps.
         """
-        parameters = self._parameters
-        placed = self._frozen.moved_by_run(self.state.run), self._run.placed(self._recent_points)
+        parameters, frozen = self._parameters, self._frozen.points
+        # To first order.
+        frozen = replace(frozen, places=frozen.places + frozen.by_run @ (self.state.run - self._frozen.run))
+        placed = frozen, self._run.placed(self._recent_points)
         weak = WeakDirections.of(placed, parameters)
         surfaces = [weak.without(points, points.scans) for points in placed]
         recent = surfaces[1]
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        self._lists = self._lists or [Neighbours(points, self._frozen.group_scans) for points in surfaces]
+        self._lists = self._lists or [Neighbours(points, self._parameters.group_scans) for points in surfaces]
         pairs = [pairs_of(own, sources, points, cut, parameters) for own, points in zip(self._lists, surfaces)]
         met = [(one, sources, points) for one, points in zip(pairs, surfaces)]
         if self._known is not None:
@@ -294,8 +267,8 @@ class Window:
             known = weak.without(known, sources.scans[to_known.rows])
             met.insert(1, (to_known, sources, known))
         self._met = self._run.submaps.within(met) if self._are_apart else met
-        to_frozen, *others = self._met
-        return [(weighted(to_frozen[0], self._frozen.importance), *to_frozen[1:]), *others]
+        (to_frozen, *compared), *others = self._met
+        return [(weighted(to_frozen, self._frozen.importance), *compared), *others]
 
     def _nodes_of(self, unknowns: np.ndarray) -> np.ndarray:
         return unknowns[: self._layout.run_start].reshape(-1, self._layout.width)

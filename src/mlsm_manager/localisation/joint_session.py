@@ -169,7 +169,7 @@ class JointSession:
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""
-        self.rivals.follow(_moved_track(track, self.T_map_odom), time)
+        self.solver.log.odometry.extend(_moved_track(track, self.T_map_odom), time)
 
     def heard(self, cloud: MapCloud) -> Tuple[np.ndarray, np.ndarray]:
         """Return the points (n, 4) of a cloud in map, and where the sonar was when it heard each, (n, 2) m."""

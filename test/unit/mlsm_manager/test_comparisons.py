@@ -10,7 +10,7 @@ from made_harbour import SONAR_IN_BASE, logged, tour
 from made_models import DVL, HEADING, THRUSTERS, UNAIDED, points_of, solution_of, solver_parameters, some_state
 
 from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, Neighbours, summed
-from mlsm_manager.joint_solver.compiled_comparisons import Limits, Pairs, Surfaces, scattered_terms, weighed_pairs
+from mlsm_manager.joint_solver.compiled_comparisons import Pairs, scattered_terms, weighed_pairs
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE
 from mlsm_manager.joint_solver.odometry_log import as_complex
@@ -190,8 +190,8 @@ def test_comparisons_fade_out_with_distance_and_angle(seed, count):
     limits = (parameters.cut, FADING * parameters.cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
     expected = shares * ramp(distance, *limits[:2]) * ramp(cosine, *limits[2:])
     expected = expected * sources.qualities[rows] * targets.qualities[neighbours]
-    own, others = (Surfaces(points.normals, points.qualities) for points in (sources, targets))
-    found = weighed_pairs((rows, neighbours, distance, shares), own, others, Limits(*limits))
+    own, others = ((points.normals, points.qualities) for points in (sources, targets))
+    found = weighed_pairs((rows, neighbours, distance, shares), own, others, limits)
     kept = expected > 0.0
     np.testing.assert_array_equal(found[0], rows[kept])
     np.testing.assert_array_equal(found[1], neighbours[kept])
