@@ -36,9 +36,12 @@ class LiveSolver:
     """
 
     def __init__(
-        self, parameters: SolverParameters, log: RunLog, start: Optional[np.ndarray] = None,
+        self,
+        parameters: SolverParameters,
+        log: RunLog,
+        start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
-    ) -> None:  # fmt: skip
+    ) -> None:
         """`log`: without scans. `start`: (3,) standard deviations of the first pose in the map, m, m, rad; None: it
         defines the map. `known`: surfaces that the map has already.
         """

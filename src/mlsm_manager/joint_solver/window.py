@@ -131,9 +131,13 @@ class Window:
     _solved: Callable[[NormalEquations], EquationSolution] = staticmethod(dense_solution)
 
     def __init__(
-        self, solution: Solution, free_nodes: int, estimates: Sequence[LiveEstimate] = (),
-        covariances: Optional[np.ndarray] = None, start: Optional[np.ndarray] = None,
-    ) -> None:  # fmt: skip
+        self,
+        solution: Solution,
+        free_nodes: int,
+        estimates: Sequence[LiveEstimate] = (),
+        covariances: Optional[np.ndarray] = None,
+        start: Optional[np.ndarray] = None,
+    ) -> None:
         """free_nodes: how many of the newest nodes may move besides the one before them; all others are frozen.
 
         estimates: one per earlier scan. covariances: (f, 3, 3) of the frozen nodes' poses, at least as many as there

@@ -77,20 +77,21 @@ class DistributionMatcher:
 
     def __init__(self, limits: MatcherLimits, beam_width: float, range_scale_deviation: float) -> None:
         """beam_width: horizontal, rad. range_scale_deviation: of a common relative error of all ranges."""
-        self.limits = limits
-        self.beam_width = beam_width
-        self.range_scale_deviation = range_scale_deviation
+        self.limits, self.beam_width, self.range_scale_deviation = limits, beam_width, range_scale_deviation
 
     def match(self, scan: Scan, target: BlockSource, belief: Belief) -> MatchResult:
         start = time.perf_counter()
-        state = _prior_state(belief)
+        # States without variance are fixed.
+        state = PriorState(belief.theta, np.linalg.inv(belief.covariance + _LEAST_VARIANCE * np.eye(STATES)))
         motion = PlanarMotion(scan, self.beam_width / np.sqrt(12.0))
         fewest = self.limits.min_points
         window = self._window(motion, state)
         blocks = _in_reach(target, motion, state, window)
         if len(scan) < fewest or len(blocks) < fewest:
             reason = f"{len(scan)} points and {len(blocks)} blocks in reach, must be {fewest} or more"
-            return _unmatched(MatchStatus.TOO_FEW_POINTS, reason, motion, state, start)
+            nothing, covariance = np.empty(0), np.linalg.inv(state.information)
+            fit = Fit(state.mean, covariance, 0.0, 1.0, 0.0, nothing.astype(bool), nothing, 0, converged=False)
+            return _result(MatchStatus.TOO_FEW_POINTS, reason, motion, fit, start)
         fits, refiner = self._fits(motion, blocks, state, window)
         best = fits[0]
         status, reason = self._judge(best, refiner, state, blocks)
@@ -132,21 +133,18 @@ class DistributionMatcher:
         used = int(np.count_nonzero(best.inliers))
         if used < limits.min_points:
             return MatchStatus.TOO_FEW_POINTS, f"{used} points on the map, must be {limits.min_points} or more"
-        certainty = significance(lambda moves: refiner.matched_shares(best.theta, moves))
+        certainty = significance(lambda moves: refiner.points.matched_shares(best.theta, moves))
         if certainty < limits.min_significance:
             return MatchStatus.DIVERGED, f"{certainty:.1f} standard deviations better than chance"
         jump = float(np.sqrt(2.0 * state.prior_cost(best.theta)))
         if jump > limits.max_jump:
             return MatchStatus.REJECTED_JUMP, f"{jump:.1f} standard deviations from where it was expected"
-        explained, agreed = agreement(refiner.world(best.theta), best.inliers, best.theta[POSITION], target.mean[:, :2])
+        echoes = refiner.points.world(best.theta)
+        explained, agreed = agreement(echoes, best.inliers, best.theta[POSITION], target.mean[:, :2])
         if explained < limits.min_explained:
             return MatchStatus.DIVERGED, f"only {explained:.2f} of the echoes lie on the map: perhaps another place"
         if agreed < limits.min_agreement:
             return MatchStatus.DIVERGED, f"scan and map agree by only {agreed:.2f}: perhaps another place"
-        return self._judge_certainty(best)
-
-    def _judge_certainty(self, best: Fit) -> Tuple[MatchStatus, str]:
-        limits = self.limits
         position = float(np.sqrt(np.linalg.eigvalsh(best.covariance[POSITION, POSITION])[-1]))
         if position > limits.max_position_deviation:
             return MatchStatus.AMBIGUOUS, f"standard deviation of {position:.2f} m in the least certain direction"
@@ -214,11 +212,6 @@ def _excluded(fit: Fit, theta: np.ndarray) -> bool:
     return bool(difference @ np.linalg.solve(fit.covariance[POSE, POSE], difference) > _EXCLUDED**2)
 
 
-def _prior_state(belief: Belief) -> PriorState:
-    """Return what is believed as a prior; states without variance are fixed."""
-    return PriorState(belief.theta, np.linalg.inv(belief.covariance + _LEAST_VARIANCE * np.eye(STATES)))
-
-
 def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, start: float) -> MatchResult:
     used = fit.distances[fit.inliers]
     to_output = np.zeros((6, STATES))
@@ -236,9 +229,3 @@ def _result(status: MatchStatus, reason: str, motion: PlanarMotion, fit: Fit, st
         beam_poses=motion.path(fit.theta),
         reason=reason,
     )
-
-
-def _unmatched(status: MatchStatus, reason: str, motion: PlanarMotion, state: PriorState, start: float) -> MatchResult:
-    nothing = np.empty(0)
-    fit = Fit(state.mean, np.linalg.inv(state.information), 0.0, 1.0, 0.0, nothing.astype(bool), nothing, 0, False)
-    return _result(status, reason, motion, fit, start)

@@ -11,11 +11,10 @@ from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.scan_path import POSITION, STATES, PlanarMotion
 from node_support.geometry import rotated
 
-INLIER = 3.0  # standard deviations: of a planar Gaussian, 99 % lie within three
-# m per standard deviation of the kernel: no block of another surface within a gate of 6 m at first, 1.9 m at last.
-_GATE = 0.75
-# Points of a scan that can share one window of the map: a window of 2.5 m holds five of a wall on either side.
-_NEIGHBOURS = 12
+NARROWEST = 2.5  # standard deviations at which the robust kernel bends at the end, by which places are compared
+_INLIER = 3.0  # standard deviations: of a planar Gaussian, 99 % lie within three
+_GATE = 0.75  # m per standard deviation of the kernel: no block of another surface within 6 m at first, 1.9 m at last
+_NEIGHBOURS = 12  # points of a scan that can share a window of the map: 2.5 m hold five of a wall on either side
 
 
 @dataclass(frozen=True)
@@ -60,7 +59,12 @@ class Normal:
     @property
     def on_surface(self) -> np.ndarray:
         """(n,) bool: points that lie on a surface of the map."""
-        return (self.correspondences.squared < INLIER**2) & (self.weight > 0.0)
+        return (self.correspondences.squared < _INLIER**2) & (self.weight > 0.0)
+
+    @property
+    def log_likelihood_gain(self) -> float:
+        """Over no correspondences, nat."""
+        return float((self.weight * _saved(self.correspondences.squared)).sum())
 
 
 class PointEquations:
@@ -74,23 +78,19 @@ class PointEquations:
         self, motion: PlanarMotion, target: LocalDistributions, expected: np.ndarray, range_scale_deviation: float
     ) -> None:
         """`expected`: (8,) a state; `range_scale_deviation`: relative, 0 where ranges are certain."""
-        self._motion = motion
-        self._target = target
-        self._range_scale_deviation = range_scale_deviation
-        spots = motion.points(motion.path(expected))
+        self._motion, self._target, self._range_scale_deviation = motion, target, range_scale_deviation
+        spots = self.world(expected)
         self._apart, _ = cKDTree(spots).query(spots, k=np.arange(1, min(_NEIGHBOURS, len(spots)) + 1))
 
-    def correspondences(self, theta: np.ndarray) -> Correspondences:
-        """Return the correspondences of the points when the state is `theta` (8,)."""
-        path = self._motion.path(theta)
-        world = self._motion.points(path)
-        return self._correspondences(world, self._motion.arms(world, path))
+    def world(self, theta: np.ndarray) -> np.ndarray:
+        """Return the points (n, 2) in map when the state is `theta` (8,)."""
+        return self._motion.points(self._motion.path(theta))
 
     def normal(self, theta: np.ndarray, scale: float) -> Normal:
         """Return the normal equations at `theta` (8,) with a robust kernel of `scale` standard deviations."""
-        correspondences = self.correspondences(theta)
+        correspondences = self._at(theta)
         weight = self._weights(correspondences, scale)
-        robust = weight * geman_mcclure(correspondences.squared, scale)
+        robust = weight * _geman_mcclure(correspondences.squared, scale)
         weighted = correspondences.metric * robust[:, np.newaxis, np.newaxis]
         jacobian = self._motion.point_jacobian(correspondences.arms, theta)
         weighted_jacobian = weighted @ jacobian
@@ -98,16 +98,16 @@ class PointEquations:
         weighted_arms = np.einsum("nab,nb->na", weighted, correspondences.arms)
         return Normal(correspondences, gradient, jacobian, weighted_jacobian, weighted_arms, weight)
 
-    def matched_shares(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+    def matched_shares(self, theta: np.ndarray, moves: np.ndarray) -> np.ndarray:
         """Return (k,) which share of the points lies on a surface when `theta` is moved by `moves` (k, 3)."""
         correspondences = self._moved(theta, moves)
-        matched = (correspondences.squared < INLIER**2) & (correspondences.distances < _GATE * scale)
+        matched = (correspondences.squared < _INLIER**2) & (correspondences.distances < _GATE * NARROWEST)
         return matched.reshape(len(moves), -1).mean(axis=1)
 
-    def log_likelihood_gains(self, theta: np.ndarray, moves: np.ndarray, scale: float) -> np.ndarray:
+    def log_likelihood_gains(self, theta: np.ndarray, moves: np.ndarray) -> np.ndarray:
         """Return (k,) log-likelihood gain [nat] over no correspondences, when `theta` is moved by `moves` (k, 3)."""
         correspondences = self._moved(theta, moves)
-        each = self._weights(correspondences, scale) * _saved(correspondences.squared, scale)
+        each = self._weights(correspondences, NARROWEST) * _saved(correspondences.squared)
         return each.reshape(len(moves), -1).sum(axis=1)
 
     def weighed(self, normal: Normal, inflation: float) -> Tuple[np.ndarray, np.ndarray]:
@@ -139,10 +139,10 @@ class PointEquations:
             of_scale = np.outer(gain, gain) / self._range_scale_deviation**2
         return gradient / inflation, jacobian.transpose(0, 2, 1) @ weighted_jacobian / inflation, of_scale
 
-    def gradient(self, theta: np.ndarray, scale: float, gain: np.ndarray) -> np.ndarray:
+    def gradient(self, theta: np.ndarray, gain: np.ndarray) -> np.ndarray:
         """Return the gradient (8,) of all points at `theta`, less `gain` (8,) times that by the ranges' scale."""
-        correspondences = self.correspondences(theta)
-        weights = self._weights(correspondences, scale) * geman_mcclure(correspondences.squared, scale)
+        correspondences = self._at(theta)
+        weights = self._weights(correspondences, NARROWEST) * _geman_mcclure(correspondences.squared, NARROWEST)
         force = np.einsum("nab,nb->na", correspondences.metric, correspondences.residual) * weights[:, np.newaxis]
         return self._motion.gradient_of(force, correspondences.arms, theta) - gain * float(
             (force * correspondences.arms).sum()
@@ -151,9 +151,8 @@ class PointEquations:
     def map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return the share of the points' information that is left after the map's own noise.
 
-        nearest: (k n,), the blocks of the points at k places, one place after the other.
-        k points of a scan that are compared with the same m points of the map err by s^2/k + s^2/m together, and the
-        fit cannot see the second part.
+        nearest: (k n,), the blocks of the points at k places, one place after the other. k points of a scan that are
+        compared with the same m points of the map err by s^2/k + s^2/m together; the fit cannot see the second part.
         """
         window = self._target.window[nearest][:, np.newaxis]
         apart = np.tile(self._apart, (len(nearest) // len(self._apart), 1))
@@ -161,15 +160,18 @@ class PointEquations:
         map_points = self._target.point_count[nearest]
         return map_points / (map_points + scan_points)
 
+    def _at(self, theta: np.ndarray) -> Correspondences:
+        path = self._motion.path(theta)
+        world = self._motion.points(path)
+        return self._correspondences(world, self._motion.arms(world, path))
+
     def _moved(self, theta: np.ndarray, moves: np.ndarray) -> Correspondences:
         """Return the correspondences when the pose is moved by `moves` (k, 3): of k times n points in a row."""
         path = self._motion.path(theta)
-        world = self._motion.points(path)
-        turn = moves[:, np.newaxis, 2]
+        world, turn = self._motion.points(path), moves[:, np.newaxis, 2]
         turned = rotated(world - theta[POSITION], turn) + theta[POSITION] + moves[:, np.newaxis, :2]
-        return self._correspondences(
-            turned.reshape(-1, 2), rotated(self._motion.arms(world, path), turn).reshape(-1, 2)
-        )
+        arms = rotated(self._motion.arms(world, path), turn)
+        return self._correspondences(turned.reshape(-1, 2), arms.reshape(-1, 2))
 
     def _correspondences(self, world: np.ndarray, arms: np.ndarray) -> Correspondences:
         distances, nearest = self._target.nearest(world)
@@ -183,14 +185,9 @@ class PointEquations:
         return share * (correspondences.distances < _GATE * scale)
 
 
-def log_likelihood_gain(normal: Normal, scale: float) -> float:
-    """Return the log-likelihood gain [nat] over no correspondences."""
-    return float((normal.weight * _saved(normal.correspondences.squared, scale)).sum())
-
-
-def _saved(squared: np.ndarray, scale: float) -> np.ndarray:
-    """Return by how much the costs (n,), whose slope the weights are, are below those far off: half of `scale`^2."""
-    return scale**2 / 2.0 - 0.5 * squared / (1.0 + squared / scale**2)
+def _saved(squared: np.ndarray) -> np.ndarray:
+    """Return by how much the costs (n,), whose slope the weights are, are below those far off: half of NARROWEST^2."""
+    return NARROWEST**2 / 2.0 - 0.5 * squared / (1.0 + squared / NARROWEST**2)
 
 
 def _scale_gradient(normal: Normal) -> np.ndarray:
@@ -206,9 +203,6 @@ def _inverse(matrices: np.ndarray) -> np.ndarray:
     return result / (a * d - b * b)[:, np.newaxis, np.newaxis]
 
 
-def geman_mcclure(squared: np.ndarray, scale: float) -> np.ndarray:
-    """Return Gauss-Newton weights (n,) of squared normalised residuals (n,): 1 at 0, 1/4 at `scale`, towards 0.
-
-    Geman and McClure (1985).
-    """
+def _geman_mcclure(squared: np.ndarray, scale: float) -> np.ndarray:
+    """Return weights (n,) of squared normalised residuals (n,): 1 at 0, 1/4 at `scale` (Geman and McClure 1985)."""
     return (1.0 + squared / scale**2) ** -2
