@@ -89,7 +89,8 @@ def search(
     steps = int(np.ceil(window.angle / YAW_STEP))
     yaws = np.arange(-steps, steps + 1) * YAW_STEP
     offsets = np.arange(-reach, reach + 1) * field.cell
-    prior_cost = _prior_costs(offsets, yaws, penalty)
+    apart = np.stack(np.meshgrid(yaws, offsets, offsets, indexing="ij")[::-1], axis=-1)  # x, y, yaw
+    prior_cost = np.einsum("...a,ab,...b->...", apart, penalty, apart).astype(np.float32)
     scores = np.empty((len(window.yaw_rates), len(yaws), len(offsets), len(offsets)), dtype=np.float32)
     for number, rate in enumerate(window.yaw_rates):
         theta = center.copy()
@@ -99,12 +100,6 @@ def search(
             points = center[POSITION] + rotated(arms, yaw)
             scores[number, index] = field.shifted_means(points, reach) - prior_cost[index]
     return _peaks(scores, center, window.yaw_rates, yaws, offsets, count)
-
-
-def _prior_costs(offsets: np.ndarray, yaws: np.ndarray, penalty: np.ndarray) -> np.ndarray:
-    yaw, y, x = np.meshgrid(yaws, offsets, offsets, indexing="ij")
-    difference = np.stack([x, y, yaw], axis=-1)
-    return np.einsum("...a,ab,...b->...", difference, penalty, difference).astype(np.float32)
 
 
 def _peaks(
@@ -117,18 +112,14 @@ def _peaks(
         index = np.unravel_index(int(best.argmax()), best.shape)
         if not np.isfinite(best[index]):
             break
-        theta = np.array(center, dtype=np.float64)
+        theta = center.copy()
         theta[POSE] += offsets[index[2]], offsets[index[1]], yaws[index[0]]
         theta[RATE_YAW] += rates[best_rate[index]]
         found.append(theta)
-        _clear_around(best, index, yaws, offsets)
+        near = [np.abs(yaws - yaws[index[0]]) < _APART_YAW]
+        near += [np.abs(offsets - offsets[axis_index]) < _APART for axis_index in index[1:]]
+        best[np.ix_(*near)] = -np.inf
     return found
-
-
-def _clear_around(best: np.ndarray, index: tuple, yaws: np.ndarray, offsets: np.ndarray) -> None:
-    near = [np.abs(yaws - yaws[index[0]]) < _APART_YAW]
-    near += [np.abs(offsets - offsets[axis_index]) < _APART for axis_index in index[1:]]
-    best[np.ix_(*[np.flatnonzero(mask) for mask in near])] = -np.inf
 
 
 def separation(first: np.ndarray, second: np.ndarray) -> float:

@@ -17,11 +17,11 @@ from scipy.spatial import cKDTree
 from mlsm_manager.surface_map.blocks import Blocks
 
 _NEIGHBOURS = 16  # blocks that make one distribution: 16 fill the broad window where blocks lie as close as cells allow
-# The window reaches to the second neighbour: with the block itself three, the fewest that show a line.
-_WINDOW_NEIGHBOUR = 2
-# m: above the diagonal of a cell of 0.5 m, below the distance of two jetties.
-_LEAST_WINDOW = 0.7
-_GREATEST_WINDOW = 2.5
+_WINDOW_NEIGHBOUR = 2  # to which the window reaches: with the block itself three, the fewest that show a line
+_LEAST_WINDOW, _GREATEST_WINDOW = (
+    0.7,
+    2.5,
+)  # m: above the diagonal of a cell of 0.5 m, below the distance of two jetties
 _ALONG_MARGIN = 3.0  # times the information that a window itself makes up along a wall
 _PRIOR_POINTS = 2.0  # the typical thickness of surfaces counts as this many points more
 _LEAST_DEVIATION = 0.1  # m: range resolution of 50 m in 500 bins
@@ -71,32 +71,26 @@ class _Window:
     members: np.ndarray
     width: np.ndarray
 
-    @staticmethod
-    def around(blocks: Blocks, distances: np.ndarray, neighbours: np.ndarray, width: np.ndarray) -> "_Window":
+    @classmethod
+    def around(cls, blocks: Blocks, distances: np.ndarray, neighbours: np.ndarray, width: np.ndarray) -> "_Window":
         """Return windows of `width` (n,) over the `neighbours` (n, k) of each block, at `distances` (n, k) m."""
-        counts = blocks.count[neighbours]
+        counts, centers = blocks.count[neighbours], blocks.mean[neighbours, :2]
         weights = np.sqrt(counts) * np.exp(-0.5 * (distances / width[:, np.newaxis]) ** 2)
         weights = weights / weights.sum(axis=1, keepdims=True)
-        mean, covariance = _moments(weights, neighbours, blocks)
+        mean = np.einsum("ij,ijk->ik", weights, centers)
+        spread = centers - mean[:, np.newaxis, :]
+        covariance = np.einsum("ij,ija,ijb->iab", weights, spread, spread)
+        own = np.einsum("ij,ijk->ik", weights, blocks.variance[neighbours, :2])
+        covariance[:, 0, 0] += own[:, 0]
+        covariance[:, 1, 1] += own[:, 1]
         values, vectors = np.linalg.eigh(covariance)
         members = 1.0 / (weights**2 / counts).sum(axis=1)
         turn = (values[:, 0] + _LEAST_DEVIATION**2) / (values[:, 1] + _LEAST_DEVIATION**2) / members
-        return _Window(mean, covariance, vectors, turn, members, width)
+        return cls(mean, covariance, vectors, turn, members, width)
 
     def along(self, axes: np.ndarray) -> np.ndarray:
         """Return the variance (n,) along `axes` (n, 2)."""
         return np.einsum("na,nab,nb->n", axes, self.covariance, axes)
-
-
-def _moments(weights: np.ndarray, neighbours: np.ndarray, blocks: Blocks) -> Tuple[np.ndarray, np.ndarray]:
-    centers = blocks.mean[neighbours, :2]
-    mean = np.einsum("ij,ijk->ik", weights, centers)
-    spread = centers - mean[:, np.newaxis, :]
-    covariance = np.einsum("ij,ija,ijb->iab", weights, spread, spread)
-    own = np.einsum("ij,ijk->ik", weights, blocks.variance[neighbours, :2])
-    covariance[:, 0, 0] += own[:, 0]
-    covariance[:, 1, 1] += own[:, 1]
-    return mean, covariance
 
 
 def _structure(close: _Window, broad: _Window) -> Tuple[np.ndarray, np.ndarray]:
