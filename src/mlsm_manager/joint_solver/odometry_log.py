@@ -1,7 +1,7 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
 from dataclasses import dataclass, field
-from typing import Any, List, Tuple, Union
+from typing import Any, Tuple
 
 import numpy as np
 
@@ -61,10 +61,6 @@ class GrowingTable:
         """Return a column (n, ...), a view that is valid until the next change."""
         return self._columns[name].values
 
-    def chosen(self, rows: Union[slice, np.ndarray], *names: str) -> List[np.ndarray]:
-        """Return `rows`, a slice or indices, of the columns with `names`."""
-        return [self._columns[name].values[rows] for name in names]
-
     def extend(self, **rows: np.ndarray) -> None:
         """Append m rows: (m, ...) of each column."""
         for name, array in self._columns.items():
@@ -75,21 +71,17 @@ class GrowingTable:
             array.shorten(count)
 
     def keep(self, chosen: np.ndarray) -> None:
-        """Keep the chosen rows, (n,) bool, in little more memory than they need."""
         for array in self._columns.values():
             array.keep(chosen)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
+    """times: (m,) s. poses: (m, 3) T_odom_base. positions: (m,) complex x + i y [m] in odom.
 
-    held: (m,) s, for how long until then positions did not change at all while the heading did, or were lost: the
-    odometry told nothing, or the vehicle was at rest.
-
-    positions: (m,) complex x + i y [m] in odom.
-
-    "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
+    ahead: (m, 2) m, where a vehicle would be that always went along the reported heading, at 1 m/s since the run began:
+    a path for an odometry that reports no other. held: (m,) s, for how long until then positions did not change at all
+    while the heading did, or were lost: the odometry told nothing, or the vehicle was at rest.
     """
 
     times: np.ndarray
@@ -163,7 +155,8 @@ class OdometryLog:
     def path(self, times: np.ndarray, start: float, end: float) -> Tuple[Motion, Motion]:
         """Return the motion at `times` (m,), and the known one from `start` to `end` [s] with the nearest beyond."""
         near = _around(self._table["times"], start, end)
-        return self.motion(times), Motion(*self._table.chosen(near, "times", "poses", "ahead", "held"))
+        known = (self._table[name][near] for name in ("times", "poses", "ahead", "held"))
+        return self.motion(times), Motion(*known)
 
     def track_from(self, start: float) -> Track:
         """Return the known poses from `start` [s] on, and the one before; for how long positions were held is lost."""

@@ -141,7 +141,7 @@ def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optio
     covariance = covariance[:-RUN_COLUMNS, :-RUN_COLUMNS]
     found = _place_after_silence(solution, covariance, silent) if silent else None
     if found is not None and found.is_certain and not solution.submaps.is_apart:
-        solution.move_newest(_shares_of_move(solution.log, solution.log.scan_count - 1), found.shift)
+        _move_newest(solution, solution.log.scan_count - 1, found.shift)
     elif found is not None and found.reach > solution.parameters.wide_cut:
         solution.submaps.begin()
     else:
@@ -194,7 +194,7 @@ def put_submap(solution: Solution, covariance: np.ndarray) -> PlaceCandidate:
     rows = log.surfaces.rows(max(first, last - _SUBMAP_SCANS), last)
     found = _best_place(solution, thinned(rows, _SUBMAP_POINTS), covariance)
     if found.is_certain:
-        solution.move_newest(_shares_of_move(log, first), found.shift)
+        _move_newest(solution, first, found.shift)
         solution.submaps.join()
     return found
 
@@ -288,11 +288,12 @@ def silent_before(log: RunLog, scan: int) -> int:
     return scan - 1 - int(heard[-1]) if len(heard) else scan
 
 
-def _shares_of_move(log: RunLog, first: int) -> np.ndarray:
-    """Return what share (k,) of their move the newest nodes go with the scans from `first` on: in a silence a part."""
-    silent = silent_before(log, first)
-    times = log.node_times[first - silent :]
-    return np.minimum((times[1:] - times[0]) / (times[silent] - times[0]), 1.0)
+def _move_newest(solution: Solution, first: int, shift: np.ndarray) -> None:
+    """Move the nodes of the scans from `first` on by `shift` (2,) [m], and those of a silence before them in part."""
+    silent = silent_before(solution.log, first)
+    times = solution.log.node_times[first - silent :]
+    shares = np.minimum((times[1:] - times[0]) / (times[silent] - times[0]), 1.0)
+    solution.state.nodes[-len(shares) :, :2] += np.outer(shares, shift)
 
 
 def _map_around(solution: Solution, sources: PlacedPoints, reach: float) -> PlacedPoints:

@@ -1,6 +1,6 @@
 """What was measured during a run: surface points of every scan, the nodes' times, the odometry; and its storing."""
 
-from dataclasses import fields, is_dataclass
+from dataclasses import fields, is_dataclass, replace
 from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
@@ -16,8 +16,8 @@ _POINTS_OF_PLATEAU = 2.0  # per echo: plateaus have 3 to 4 at a spacing of 1 m, 
 
 
 _OF_POINTS = [field.name for field in fields(SurfacePoints)]
+# Of a scan: number of poses of the odometry before it, its points and echoes, and whether its points are forgotten.
 _SCAN = [("odometry", int), ("points", int), ("echoes", float), ("forgotten", bool)]
-"""Of a scan: number of poses of the odometry before it, its points and echoes, and whether its points are forgotten."""
 
 
 class PointTable:
@@ -42,13 +42,15 @@ class PointTable:
         self._table.extend(**vars(points), scans=np.full(count, self.scan_count))
         self._starts.extend([self._starts.values[-1] + count])
 
-    def since(
-        self, scan: int, change: Callable[[SurfacePoints], SurfacePoints] = lambda points: points
-    ) -> "PointTable":  # fmt: skip
-        """Return a table of what `change` makes of `scan` and all later ones, the first of which is number 0 there."""
+    def since(self, scan: int, change: Optional[Callable[[SurfacePoints], SurfacePoints]] = None) -> "PointTable":
+        """Return a table of `scan` and all later ones, the first of which is number 0 there.
+
+        change: what makes of the points of a scan those of the table.
+        """
         later = PointTable()
         for number in range(scan, self.scan_count):
-            later.append(change(self.heard(number, number + 1)[0]))
+            points, _ = self.heard(number, number + 1)
+            later.append(change(points) if change else points)
         return later
 
     def shorten(self, scans: int) -> None:
@@ -74,8 +76,8 @@ class PointTable:
 
     def points(self, rows: np.ndarray) -> Tuple[SurfacePoints, np.ndarray]:
         """Return the points in `rows` (n,) int, and the scan (n,) int of each."""
-        *columns, scans = self._table.chosen(rows, *_OF_POINTS, "scans")
-        return SurfacePoints(*columns), scans.astype(np.int64)
+        columns = (self._table[name][rows] for name in _OF_POINTS)
+        return SurfacePoints(*columns), self._table["scans"][rows].astype(np.int64)
 
     def heard(self, first: int, last: int) -> Tuple[SurfacePoints, np.ndarray]:
         """Return the points of scans `first` to `last` - 1, oldest scan first, and the scan (n,) int of each."""
@@ -205,7 +207,8 @@ def parts_of(scan: Scan, count: int, newest: Optional[float]) -> List[Scan]:
     ends = np.linspace(start, scan.reference_time, count + 1)[1:]
     ends[-1] = scan.reference_time
     part_of_point = np.minimum(np.searchsorted(ends, scan.times), count - 1)
-    return [_selected(scan, part_of_point == part, end) for part, end in enumerate(ends)]
+    parts = enumerate(ends.tolist())
+    return [replace(scan.chosen(part_of_point == part), reference_time=end) for part, end in parts]
 
 
 def _start(scan: Scan, newest: Optional[float]) -> float:
@@ -213,10 +216,6 @@ def _start(scan: Scan, newest: Optional[float]) -> float:
     if newest is None:
         return min(scan.start, scan.reference_time - _SHORTEST_SCAN)
     return max(scan.start, newest) if scan.start < scan.reference_time else newest
-
-
-def _selected(scan: Scan, rows: np.ndarray, end: float) -> Scan:
-    return Scan(scan.points[rows], scan.times[rows], scan.moving[rows], scan.track, float(end))
 
 
 _LENGTHS = "#"  # after the name of arrays of different lengths, which stand one after the other

@@ -19,8 +19,7 @@ from mlsm_manager.scan_matching.scan import MapCloud, Scan
 from node_support.geometry import inverse, transformed
 
 _HALF_SECOND = 0.5  # the velocity of a point is averaged over one second, longer than the odometry's period
-MAP = 0
-"""The submap of all scans whose place in the map is known."""
+MAP = 0  # the submap of all scans whose place in the map is known
 
 
 class Submaps:
@@ -41,7 +40,7 @@ class Submaps:
 
     @property
     def newest(self) -> int:
-        """The submap of the newest scan; that of the map where there is none."""
+        """The submap of the newest scan."""
         return self._numbers[-1] if self._numbers else MAP
 
     @property
@@ -75,18 +74,11 @@ class Submaps:
         joined = self.newest
         self._numbers = [MAP if number == joined else number for number in self._numbers]
 
-    def within(
-        self, met: List[Tuple[Pairs, PlacedPoints, PlacedPoints]]
-    ) -> List[Tuple[Pairs, PlacedPoints, PlacedPoints]]:
+    def within(self, pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints) -> Pairs:
         """Return the comparisons of points of one submap; what was in the map before the run is of the map."""
-        found = []
-        for pairs, sources, targets in met:
-            same = self._of(sources.scans[pairs.rows]) == self._of(targets.scans[pairs.neighbours])
-            found.append((Pairs(*(each[same] for each in pairs)), sources, targets))
-        return found
-
-    def _of(self, scans: np.ndarray) -> np.ndarray:
-        return np.where(scans < 0, MAP, self.numbers[scans])
+        scans = sources.scans[pairs.rows], targets.scans[pairs.neighbours]
+        own, other = (np.where(each < 0, MAP, self.numbers[each]) for each in scans)
+        return Pairs(*(each[own == other] for each in pairs))
 
 
 _NODES, _PLACES, _INFORMATION = "fix_nodes", "fix_places", "fix_information"  # the names in stored maps
@@ -170,15 +162,8 @@ class Solution:
         state.nodes[:, :YAW] -= state.nodes[0, :YAW]
         return Solution(self.log.since(scan), self.parameters, state, Submaps(self.submaps.numbers[scan:]))
 
-    def move_newest(self, shares: np.ndarray, shift: np.ndarray) -> None:
-        """Move the newest nodes by `shares` (k,) of a shift (2,) m."""
-        self.state.nodes[-len(shares) :, :2] += np.outer(shares, shift)
-
     def placed(self, heard: Tuple[SurfacePoints, np.ndarray]) -> PlacedPoints:
-        """Return points and the scan of each, as the log's tables have them, in the map.
-
-        They follow from the path between the two nodes of the scan that heard each.
-        """
+        """Return points and the scan of each, as the log's tables have them, in the map."""
         (points, scans), log, state = heard, self.log, self.state
         if not len(scans):
             return NO_POINTS
@@ -196,7 +181,7 @@ class Solution:
 
     @property
     def places(self) -> np.ndarray:
-        """Where all nodes are, (n, 2) m in map."""
+        """(n, 2) m in map, of all nodes."""
         return self.node_places(np.arange(len(self.state.nodes)))
 
     def node_places(self, nodes: np.ndarray) -> np.ndarray:

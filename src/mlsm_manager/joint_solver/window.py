@@ -270,7 +270,8 @@ class Window:
             to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])
             met.insert(1, (to_known, sources, known))
-        self._met = self._run.submaps.within(met) if self._are_apart else met
+        submaps = self._run.submaps
+        self._met = [(submaps.within(*one), *one[1:]) for one in met] if self._are_apart else met
         (to_frozen, *compared), *others = self._met
         return [(weighted(to_frozen, self._frozen.importance), *compared), *others]
 

@@ -11,7 +11,7 @@ from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.map_support import shares_heard_before
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, RUN_COLUMNS
-from mlsm_manager.joint_solver.odometry_log import OdometryLog
+from mlsm_manager.joint_solver.odometry_trials import with_odometry
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.rival_solvers import RivalSolvers
 from mlsm_manager.joint_solver.solution import Fix, Solution
@@ -164,8 +164,7 @@ class JointSession:
         """Return the newest turns of the head as a run of their own, which shares nothing with this one."""
         log, parts = self.solver.log, self.solver.parameters.parts_per_turn
         run = self.solver.solution.since(max(log.scan_count - turns * parts, 0))
-        odometry = OdometryLog.of(log.odometry.track_from(run.log.node_times[0] - _BEFORE))
-        return replace(run, log=run.log.since(0, odometry))
+        return with_odometry(run, log.odometry.track_from(run.log.node_times[0] - _BEFORE))
 
     def follow(self, track: Track, time: float) -> None:
         """Learn the odometry up to `time` [s], which `track` holds."""

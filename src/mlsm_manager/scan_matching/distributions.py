@@ -18,10 +18,7 @@ from mlsm_manager.surface_map.blocks import Blocks
 
 _NEIGHBOURS = 16  # blocks that make one distribution: 16 fill the broad window where blocks lie as close as cells allow
 _WINDOW_NEIGHBOUR = 2  # to which the window reaches: with the block itself three, the fewest that show a line
-_LEAST_WINDOW, _GREATEST_WINDOW = (
-    0.7,
-    2.5,
-)  # m: above the diagonal of a cell of 0.5 m, below the distance of two jetties
+_LEAST_WINDOW, _GREATEST_WINDOW = (0.7, 2.5)  # m: above a cell of 0.5 m, below the distance of two jetties
 _ALONG_MARGIN = 3.0  # times the information that a window itself makes up along a wall
 _PRIOR_POINTS = 2.0  # the typical thickness of surfaces counts as this many points more
 _LEAST_DEVIATION = 0.1  # m: range resolution of 50 m in 500 bins
