@@ -135,10 +135,7 @@ def _least_squares(
 
 
 def _residuals(fixes: PlacedFixes, there: np.ndarray, poses: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return how far (..., n, 2) the fixes lie from the path, east and north [m], if the map lies at `poses` (..., 3).
-
-    And the jacobian (..., n, 2, 3) by these.
-    """
+    """Return how far (..., n, 2) [m] fixes lie from the path if the map lies at `poses` (..., 3), and the jacobian."""
     turned = rotated(fixes.places, poses[..., 2, np.newaxis])
     jacobian = np.zeros((*turned.shape, 3))
     jacobian[..., 0, 0] = jacobian[..., 1, 1] = 1.0

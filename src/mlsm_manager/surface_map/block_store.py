@@ -41,11 +41,7 @@ class Runs(NamedTuple):
 
 
 class CellIndex:
-    """An open-addressing hash table from cell keys to block numbers.
-
-    A hash and not tiles: walls cross a tile in a line and a far point needs one of its own, so that on real scans
-    tiles spend more memory on empty cells than the blocks themselves take. Doubling takes some hundredths of a second
-    at a million cells.
+    """An open-addressing hash table from cell keys to block numbers: tiles would take more memory for empty cells.
 
     keys: (s,) of the cell in each place. heads: (s,) the number of its first block, NO_BLOCK where there is none.
     """

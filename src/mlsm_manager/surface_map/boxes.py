@@ -44,10 +44,7 @@ def box_type(power: int) -> BlockType:
 
 
 def box_lists(blocks: Blocks) -> BoxLists:
-    """Return the boxes that cover every block from its bottom to its top across its cell.
-
-    Blocks thinner than 2 ** THINNEST cells are drawn that thick.
-    """
+    """Return boxes that cover every block, at least 2 ** THINNEST cells thick, from bottom to top across its cell."""
     centers, power, owners = _boxes(blocks)
     tile = cell_keys(blocks.cells >> TILE_BITS)[owners]
     order = np.lexsort((power, tile))

@@ -37,10 +37,7 @@ class FirstEchoes:
 
     @staticmethod
     def of_points(points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> "FirstEchoes":
-        """Return the beams of points (n, >= 3) m, whose beams were taken at `times` (n,) s from `origins` (n, 3) m.
-
-        Points of one time belong to one beam.
-        """
+        """Return the beams of points (n, >= 3) m, one for each of `times` (n,) s, taken from `origins` (n, 3) m."""
         ranges = np.linalg.norm(points[:, :3] - origins, axis=1)
         order = np.lexsort((ranges, times))
         first = order[np.append(True, np.diff(times[order]) > 0.0)] if len(order) else order
@@ -180,10 +177,7 @@ class Carver:
     def carve(
         self, occupied: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray
     ) -> Tuple[CarveReport, Blocks]:
-        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side.
-
-        Return a report, and what was not known to be free.
-        """
+        """Carve a scan whose points are in `occupied` already; return a report, and what was not known to be free."""
         findings = self.findings(occupied, beams, points)
         occupied.count_crossings(findings.rows, findings.beams)
         gone = self.is_outworn(findings.crossed, findings.crossed.crossed + findings.beams)
@@ -227,10 +221,7 @@ class Carver:
 
 
 def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> Blocks:
-    """Put into `free` which of the blocks, one per cell, are not known well enough to be free at their height.
-
-    Return these.
-    """
+    """Put those blocks, one per cell, into `free` that are not well known to be free at their height; return these."""
     cells = noted.keys
     there, _, owners = free.find(cells)
     known = np.zeros(len(cells), dtype=bool)
