@@ -3,8 +3,8 @@
 from contextlib import closing
 
 from mcap.writer import Writer as McapWriter
+from rosbags.convert.converter import convert_1to2
 from rosbags.rosbag1 import Reader, Writer
-from rosbags.rosbag2 import Writer as SqliteWriter
 
 from recordings.bags.message_types import ros2_types
 
@@ -25,17 +25,9 @@ def write_ros1_bag(source, path, topics):
     return path
 
 
-def write_sqlite_bag(source, folder, topics=None):
+def write_sqlite_bag(source, folder, topics=()):
     """Write a folder with a .db3 file and metadata, with definitions, as ROS 2 Iron and newer do."""
-    with Reader(source) as bag, closing(SqliteWriter(folder)) as writer:
-        writer.open()
-        connections = {}
-        for connection, time, data in _messages(bag, topics):
-            if connection.id not in connections:
-                connections[connection.id] = writer.add_connection(
-                    connection.topic, connection.msgtype, typestore=ros2_types()
-                )
-            writer.write(connections[connection.id], time, data)
+    convert_1to2(source, folder, (), topics)
     return folder
 
 
@@ -45,17 +37,14 @@ def write_mcap(source, path, topics=None):
         writer = McapWriter(file)
         writer.start(profile="ros2")
         channels = {}
-        for connection, time, data in _messages(bag, topics):
+        for connection, time, raw in bag.messages():
+            if topics is not None and connection.topic not in topics:
+                continue
             if connection.id not in channels:
                 definition, _ = ros2_types().generate_msgdef(connection.msgtype, ros_version=2)
                 schema = writer.register_schema(connection.msgtype, "ros2msg", definition.encode())
                 channels[connection.id] = writer.register_channel(connection.topic, "cdr", schema)
-            writer.add_message(channels[connection.id], time, bytes(data), time)
+            data = bytes(ros2_types().ros1_to_cdr(raw, connection.msgtype))
+            writer.add_message(channels[connection.id], time, data, time)
         writer.finish()
     return path
-
-
-def _messages(bag, topics):
-    for connection, time, raw in bag.messages():
-        if topics is None or connection.topic in topics:
-            yield connection, time, ros2_types().ros1_to_cdr(raw, connection.msgtype)
