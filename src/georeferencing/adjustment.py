@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
 from georeferencing.fixes import PlacedFixes
-from georeferencing.origin import EAST_DEG, Origin
+from georeferencing.origin import EAST_DEG, Origin, moved_with_origin
 from node_support.geometry import rotated, wrapped
 
 COMPASS_DEVIATION = np.radians(3.0)  # of a compass that was calibrated, with how well it is mounted
@@ -137,7 +137,4 @@ def _least_squares(
 def _residuals(fixes: PlacedFixes, there: np.ndarray, poses: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return how far (..., n, 2) [m] fixes lie from the path if the map lies at `poses` (..., 3), and the jacobian."""
     turned = rotated(fixes.places, poses[..., 2, np.newaxis])
-    jacobian = np.zeros((*turned.shape, 3))
-    jacobian[..., 0, 0] = jacobian[..., 1, 1] = 1.0
-    jacobian[..., 0, 2], jacobian[..., 1, 2] = -turned[..., 1], turned[..., 0]
-    return there - poses[..., np.newaxis, :2] - turned, jacobian
+    return there - poses[..., np.newaxis, :2] - turned, moved_with_origin(turned)

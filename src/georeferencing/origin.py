@@ -10,8 +10,7 @@ from node_support.errors import RefusedInput, needed
 from node_support.geometry import rotated
 
 EAST_DEG = 90.0
-STORED = "origin"
-"""Name of the array in which map files keep an origin."""
+STORED = "origin"  # array in which map files keep an origin
 
 
 @dataclass(frozen=True)
@@ -76,11 +75,7 @@ class Origin:
 
     def jacobian(self, points: np.ndarray) -> np.ndarray:
         """Return how the places of points (n, >= 2) of the map move, east and north, with the origin: (n, 2, 3)."""
-        east, north = self._east_north(points).T
-        jacobian = np.zeros((len(east), 2, 3))
-        jacobian[:, 0, 0] = jacobian[:, 1, 1] = 1.0
-        jacobian[:, :, 2] = np.column_stack([-north, east])
-        return jacobian
+        return moved_with_origin(self._east_north(points))
 
     def _east_north(self, points: np.ndarray) -> np.ndarray:
         return rotated(np.asarray(points, dtype=np.float64)[:, :2], np.array(self.yaw))
@@ -90,6 +85,14 @@ class Origin:
         text = f"{self.latitude_deg:.7f}, {self.longitude_deg:.7f}, azimuth {self.azimuth_deg:.2f}"
         turn = np.degrees(np.sqrt(self.covariance[2, 2]))
         return f"{text} (deviations {deviation:.2f} m and {turn:.2f} degrees)" if self.covariance.any() else text
+
+
+def moved_with_origin(places: np.ndarray) -> np.ndarray:
+    """Return how places (..., 2) m, east and north of the origin, move with it and turn with the map: (..., 2, 3)."""
+    jacobian = np.zeros((*places.shape, 3))
+    jacobian[..., 0, 0] = jacobian[..., 1, 1] = 1.0
+    jacobian[..., 0, 2], jacobian[..., 1, 2] = -places[..., 1], places[..., 0]
+    return jacobian
 
 
 def _projection(text: str) -> Any:

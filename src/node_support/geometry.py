@@ -32,6 +32,17 @@ def grid(line: np.ndarray) -> np.ndarray:
     return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
+def cell_keys(cells: np.ndarray) -> np.ndarray:
+    """Return (n,) int64, one key per cell; cells is (n, 2) int64 with |index| < 2**31. Keys sort by x, then by y."""
+    return (cells[:, 0] << 32) + cells[:, 1]
+
+
+def cells_of_keys(keys: np.ndarray) -> np.ndarray:
+    """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
+    low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
+    return np.column_stack([(keys - low) >> 32, low])
+
+
 def members(sizes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return the group (n,) of each member of groups with `sizes` (g,), one after the other, and its number in it."""
     groups = np.repeat(np.arange(len(sizes)), sizes)

@@ -147,8 +147,13 @@ def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
     """Return the motion that a request for a recording at `path` asks for; `bag` may hold it. Raises RecordingError."""
     own = None if request.vehicle is None else _reader_of_motion(request.vehicle)
     if own is not None:
-        motion = own(request.vehicle, request.motion)
-        return motion if bag is None else _with_mounts(motion, bag, request.motion)
+        motion, names = own(request.vehicle, request.motion), request.motion
+        if bag is None:
+            return motion
+        # The file tells no frames, but the bag of the beams may tell where things are mounted.
+        fixed = {link: track for link, track in frame_tree(bag).tracks.items() if track.is_fixed}
+        track = motion.tree.tracks[(names.odom_frame, names.base_frame)]
+        return replace(motion, tree=linked(FrameTree(fixed), names, track))
     if bag is not None:
         return motion_of_bag(bag, request.motion, request.truth)
     if request.motion.declared is not None:
@@ -158,13 +163,6 @@ def motion_for(path: Path, bag: Optional[Bag], request: Request) -> Motion:
         note = f"no odometry: {len(headings)} headings from {path.name}, the position is unknown"
         return Motion(linked(FrameTree(), request.motion, headings), MotionSource.HEADING, [note])
     return unsaid_motion(FrameTree(), request.motion, "beams only")
-
-
-def _with_mounts(motion: Motion, bag: Bag, names: MotionNames) -> Motion:
-    """Return the motion of a file without frames, with what the bag of the beams says of where things are mounted."""
-    fixed = {link: track for link, track in frame_tree(bag).tracks.items() if track.is_fixed}
-    track = motion.tree.tracks[(names.odom_frame, names.base_frame)]
-    return replace(motion, tree=linked(FrameTree(fixed), names, track))
 
 
 def _truth(bags: List[Bag], request: Request) -> Optional[PoseTrack]:

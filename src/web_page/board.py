@@ -5,10 +5,8 @@ from typing import Dict, Hashable, Iterable, Set, Tuple, Union
 
 from node_support.thin_queue import ThinQueue
 
-Item = Union[str, bytes]
-"""What a page gets as one message: text is JSON."""
-NOW, WORDS, TRACK, BEAM, TILE = range(5)
-"""Priorities: what goes first where the link is too thin for all of it."""
+Item = Union[str, bytes]  # what a page gets as one message: text is JSON
+NOW, WORDS, TRACK, BEAM, TILE = range(5)  # priorities, where the link is too thin for all of it
 
 
 class Board:

@@ -10,8 +10,7 @@ from web_page.messages import text_of
 _PERIOD = 2.0  # s between two reports of a stage
 _MOST_STAGES, _MOST_VALUES, _LONGEST = 64, 40, 240
 _RATE = " per second"
-_ANSWERS = ("fine: ", "DOUBTFUL: ", "not measured: ")
-"""How mlsm_core's checks begin: mlsm_manager's self_check.verdict.Answer."""
+_ANSWERS = ("fine: ", "DOUBTFUL: ", "not measured: ")  # how checks begin: mlsm_manager's self_check.verdict.Answer
 _CAUSES, _NO_CAUSE = "causes", "none found"
 
 

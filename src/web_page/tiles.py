@@ -4,16 +4,14 @@ from typing import Callable, Set, Tuple
 
 import numpy as np
 
+from node_support.geometry import cell_keys, cells_of_keys
 from web_page.messages import tile_bytes
 
-SIDE = 32
-"""Cells along a side of a tile."""
-BORN_STEP = 2.0
-"""s: step of the times at which cells were first seen; 16 bits hold 36 hours."""
+SIDE = 32  # cells along a side of a tile
+BORN_STEP = 2.0  # s: step of the times at which cells were first seen; 16 bits hold 36 hours
 _FARTHEST_TILE = 32767
 _LEVELS_PER_DOUBLING = 8.0
 _STEPS = 65535
-_SHIFT = 2**21  # beyond the farthest cell: makes cells positive, so that two of them fit into one number
 
 
 class MapTiles:
@@ -43,7 +41,7 @@ class MapTiles:
         corners = np.floor(points / cell)
         inside = (np.abs(corners) < _FARTHEST_TILE * SIDE).all(axis=1)
         corners, points, counts = corners[inside].astype(np.int64), points[inside], counts[inside]
-        keys, owner = np.unique(_keys(corners), return_inverse=True)
+        keys, owner = np.unique(cell_keys(corners), return_inverse=True)
         total = np.bincount(owner, counts, len(keys))
         means = np.column_stack([np.bincount(owner, counts * axis, len(keys)) / total for axis in points.T])
         self._remember(keys, time)
@@ -59,27 +57,17 @@ class MapTiles:
         self._keys, self._born = keys, born
 
     def _tell(self, keys: np.ndarray, means: np.ndarray, total: np.ndarray, cell: float) -> None:
-        cells = _cells(keys)
-        tiles, owner = np.unique(_keys(cells // SIDE), return_inverse=True)
+        cells = cells_of_keys(keys)
+        tiles, owner = np.unique(cell_keys(cells // SIDE), return_inverse=True)
         order = np.argsort(owner, kind="stable")
         ends = np.cumsum(np.bincount(owner, minlength=len(tiles)))
         columns = _columns(cells, means, total, cell, self._born)
-        told = dict(zip(map(tuple, _cells(tiles).tolist()), np.split(order, ends[:-1])))
+        told = dict(zip(map(tuple, cells_of_keys(tiles).tolist()), np.split(order, ends[:-1])))
         for tile in self._shown - set(told):
             self._put(tile, tile_bytes(*tile, columns[:, :0]))
         for tile, part in told.items():
             self._put(tile, tile_bytes(*tile, columns[:, part]))
         self._shown = set(told)
-
-
-def _keys(cells: np.ndarray) -> np.ndarray:
-    """Return one number (n,) for each pair (n, 2) of numbers."""
-    return (cells[:, 0] + _SHIFT) * (2 * _SHIFT) + cells[:, 1] + _SHIFT
-
-
-def _cells(keys: np.ndarray) -> np.ndarray:
-    """Return the pairs (n, 2) that `_keys` made numbers of."""
-    return np.column_stack([keys // (2 * _SHIFT), keys % (2 * _SHIFT)]) - _SHIFT
 
 
 def _columns(cells: np.ndarray, means: np.ndarray, total: np.ndarray, cell: float, born: np.ndarray) -> np.ndarray:

@@ -21,8 +21,7 @@ _FIXED = struct.Struct("<8sHI")
 _DIGEST_BYTES = hashlib.sha256().digest_size
 _TYPES = ("<f8", "<f4", "<i8", "<i4", "<u4", "<u2", "<u1")
 _SAMPLE = 65536  # bytes of a plane that show whether packing the rest is worth its time
-_WORTHWHILE = 0.95
-"""A plane is packed when that makes its sample smaller than this share: below, the time to unpack costs more."""
+_WORTHWHILE = 0.95  # share of its sample that a packed plane has at most: above, the time to unpack costs more
 _ZLIB_LEVEL = 1  # the fastest; the best one makes the files of maps 4 % smaller in ten times the time
 _GREATEST_RATIO = 1032  # what zlib can pack at best: a plane that claims more was not made by it
 

@@ -6,6 +6,8 @@ from typing import Protocol, Sequence
 
 import numpy as np
 
+from node_support.geometry import cell_keys
+
 MEAN = slice(0, 4)
 SQUARES = slice(4, 8)
 COUNT = 8
@@ -140,11 +142,6 @@ def cells_of(points: np.ndarray, resolution: float) -> np.ndarray:
     return np.floor(points[:, :2] / resolution).astype(np.int64)
 
 
-def cell_keys(cells: np.ndarray) -> np.ndarray:
-    """Return (n,) int64, one key per cell; cells is (n, 2) int64 with |index| < 2**31. Keys sort by x, then by y."""
-    return (cells[:, 0] << 32) + cells[:, 1]
-
-
 def keys_of(points: np.ndarray, resolution: float) -> np.ndarray:
     """Return (n,) int64, the keys of the cells of points (n, >= 2)."""
     return cell_keys(cells_of(points, resolution))
@@ -153,9 +150,3 @@ def keys_of(points: np.ndarray, resolution: float) -> np.ndarray:
 def squares_of(places: np.ndarray, side: float) -> np.ndarray:
     """Return the number (n,), from 0 on, of the square of a grid that each of `places` (n, 2) lies in. side: m."""
     return np.unique(keys_of(places, side), return_inverse=True)[1]
-
-
-def cells_of_keys(keys: np.ndarray) -> np.ndarray:
-    """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
-    low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
-    return np.column_stack([(keys - low) >> 32, low])

@@ -10,8 +10,9 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import Blocks, BlockType, cell_keys, cells_of_keys
+from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.mlsm import TILE_BITS
+from node_support.geometry import cell_keys, cells_of_keys
 
 THINNEST = -4  # power of two: a sixteenth of a cell is the thinnest box that still shows
 

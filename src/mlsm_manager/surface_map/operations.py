@@ -9,8 +9,7 @@ from mlsm_manager.surface_map.map_file import StoredMap
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
 from node_support.marks import Mark
 
-_WHOLE_TURNS = 1e-12
-"""rad; a quarter turn that differs from pi / 2 by no more is one, so that its sine and cosine are exactly 0 and 1."""
+_WHOLE_TURNS = 1e-12  # rad from a quarter turn, whose sine and cosine then are exactly 0 and 1
 
 
 @dataclass(frozen=True)

@@ -18,8 +18,7 @@ _PACKED = (
     (b"PK\x03\x04", "zip", "unzip"),
     (b"\xfd7zXZ", "xz", "unxz --keep"),
     (b"\x28\xb5\x2f\xfd", "zstd", "zstd -d"),
-)
-"""First bytes, program and command of packed files."""
+)  # first bytes, program and command of packed files
 
 
 class RecordingError(ValueError):

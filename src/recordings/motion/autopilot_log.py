@@ -41,8 +41,7 @@ _FIXES, _FIX_3D = ("GPS_RAW_INT", "GPS"), 3
 _KINDS = {**_ATTITUDES, **_POSITIONS, **_DEPTHS}
 
 
-_Rows = List[Tuple[float, List[float]]]
-"""Times [s] and values of the messages of one type of one vehicle."""
+_Rows = List[Tuple[float, List[float]]]  # times [s] and values of the messages of one type of one vehicle
 
 
 def is_autopilot_log(path: Path) -> bool:

@@ -10,8 +10,7 @@ from node_support.headers import stamp_ns
 from recordings.bags.bag import Bag
 from recordings.motion.pose_track import PoseTrack
 
-Link = Tuple[str, str]
-"""Parent and child."""
+Link = Tuple[str, str]  # parent and child
 
 _KNOWN = (0.0,)  # Covariance; its first value is -1 where an Imu measures no orientation (sensor_msgs/Imu)
 _Sample = Tuple[int, Tuple[float, float, float], Tuple[float, float, float, float]]

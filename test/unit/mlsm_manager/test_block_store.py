@@ -10,8 +10,8 @@ from made_maps import map_with
 
 from mlsm_manager.surface_map import block_store
 from mlsm_manager.surface_map.block_store import NO_BLOCK, CellIndex, finished
-from mlsm_manager.surface_map.blocks import cell_keys
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
+from node_support.geometry import cell_keys
 
 CLUSTERED = st.integers(-40, 40)
 FAR = st.sampled_from([-(10**8), -(2**31) + 1, -65536, -1, 0, 1, 65536, 10**8, 2**31 - 1])
