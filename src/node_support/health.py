@@ -46,10 +46,7 @@ class _Input:
         self._newest, self._is_expected = now, False
 
     def silence(self, now: float) -> float:
-        """Return for how long [s] it has been silent; 0 while it comes as usual, and before it came twice.
-
-        One that is expected from the beginning is silent before, too.
-        """
+        """Return how long [s] it has been silent; 0 while it comes as usual and, unless expected, before it came twice."""
         seconds = now - self._newest
         return seconds if seconds > SILENCE and (self._is_expected or self._usual.overdue(now) > 0.0) else 0.0
 
@@ -131,10 +128,7 @@ class Health:
             self._values[what] = value
 
     def problem(self, kind: str, detail: str, number: int = 1, level: Level = Level.WARN) -> None:
-        """Count `number` problems of a kind and warn with the newest detail once in a while.
-
-        level: that the stage has while the problem is recent.
-        """
+        """Count `number` problems of a kind, which give the stage a level for a while, and warn now and then."""
         with self._lock:
             problem = self._counted(kind, detail, number)
             problem.level = level

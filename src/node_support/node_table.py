@@ -33,18 +33,11 @@ class Interface:
 
 @dataclass(frozen=True)
 class NodeDescription:
-    """A node's purpose in Markdown and its interfaces, in the order in which they are listed."""
+    """A node's purpose in Markdown; its interfaces, or the nodes that it runs in its process, as they are listed."""
 
     summary: str
-    interfaces: Tuple[Interface, ...]
-
-
-@dataclass(frozen=True)
-class HostDescription:
-    """A node that runs other nodes in its process: its purpose in Markdown and the names of those nodes."""
-
-    summary: str
-    hosted: Sequence[str]
+    interfaces: Tuple[Interface, ...] = ()
+    hosted: Sequence[str] = ()
 
 
 def _interface(role: str, name: str, kind: str, text: str) -> Interface:
@@ -59,7 +52,7 @@ NODES: Dict[str, NodeDescription] = {
     name: NodeDescription(row["summary"], tuple(_interface(*fields) for fields in row["interfaces"]))
     for name, row in _TABLE["nodes"].items()
 }
-HOSTS: Dict[str, HostDescription] = {name: HostDescription(**row) for name, row in _TABLE["hosts"].items()}
+HOSTS: Dict[str, NodeDescription] = {name: NodeDescription(**row) for name, row in _TABLE["hosts"].items()}
 DIAGNOSTICS = Interface(
     Role.OUTPUT, "/diagnostics", "diagnostic_msgs/DiagnosticArray", "counters and problems, once a second"
 )

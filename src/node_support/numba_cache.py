@@ -9,11 +9,9 @@ from typing import Any, Callable
 
 from numba import config, njit
 
+# Bytes by which numba may tell the types of a tuple: two and eight for each array; of a named tuple the names, too.
+# Numba 0.56 forgets the beginning of a longer one, takes it for new with nearly each call, and keeps it for ever.
 LONGEST_DESCRIPTION = 40
-"""Bytes by which numba may tell the types of a tuple: two and eight for each array; of a named tuple the names, too.
-
-Numba 0.56 forgets the beginning of a longer one, takes it for a new one with nearly each call, and keeps it for ever.
-"""
 _ADVICE = "set NUMBA_CACHE_DIR to a folder that can be written to"
 
 

@@ -30,10 +30,9 @@ _UNKNOWN_TO_MASTER = (
     "the ROS master was restarted and does not know this node, so that nobody can connect to it; the node ends. "
     "Parameters were lost with the old master: restart the launch file"
 )
+# s from the last message to the end of a node that plays a recording: when a connection ends, rospy drops what a
+# listener that stood still for a while has not yet read.
 LAST_MESSAGES_ARRIVE = 3.0
-"""s from the last message to the end of a node that plays a recording.
-
-When a connection ends, rospy drops what a listener that stood still for a while has not yet read."""
 _END_STEP = 0.01  # s: roslaunch waits for every node
 _LONGEST_END = 10.0  # s: a map may have to be saved; roslaunch kills a node after 15 s
 _PATIENCE = 5.0  # s: a master that was killed while it was connected may never answer
@@ -153,10 +152,9 @@ class _ImpatientTransport(xmlrpc.client.Transport):
 class MasterWatch:
     """Asks the master every `MASTER_PERIOD` seconds whether it knows this node.
 
-    A master that gives no answer may only be away for a while, and the node runs on. A new master, which answers that
-    it does not know the node, has neither its topics nor its parameters: nobody will ever connect to the node again.
-    It may know the node's name all the same, for rospy asks it for a parameter with each log line: then its process
-    number tells.
+    A master that gives no answer may only be away for a while. A new one, which does not know the node, has neither its
+    topics nor its parameters: nobody will ever connect to the node again. It may know the node's name all the same, for
+    rospy asks it for a parameter with each log line: then its process number tells.
     """
 
     def __init__(self) -> None:
@@ -202,8 +200,7 @@ _ARENAS = 2
 def hold_little() -> None:
     """Give large arrays memory of their own, which goes back when they do, and let threads share what is left.
 
-    A node makes arrays of all sizes for hours and keeps a few. glibc would hold several times what it uses: a heap for
-    each thread, with holes where large arrays were.
+    glibc would hold several times what a node uses: a heap for each thread, with holes where large arrays were.
     """
     set_option = getattr(ctypes.CDLL(None), "mallopt", None)
     if set_option is not None:

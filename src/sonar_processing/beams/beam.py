@@ -105,9 +105,8 @@ def project_beams(
 ) -> np.ndarray:
     """Return (n, dispersed_points * bins, 4) float32: x y z [m] in the target frame and echo strength, of n beams.
 
-    Every bin is drawn as `dispersed_points` points side by side across the horizontal `beam_width` [rad]; one point
-    lies on the beam's axis. The points of a beam come ordered by side, then by range. The beams have the same ranges;
-    T_target_sonar is (n, 4, 4).
+    Every bin is drawn as `dispersed_points` points across the horizontal `beam_width` [rad], one alone on the beam's
+    axis; they come ordered by side, then by range. All beams have the same ranges. T_target_sonar: (n, 4, 4).
     """
     angles = np.array([beam.angle for beam in beams])
     half_width = beam_width / 2.0 if dispersed_points > 1 else 0.0

@@ -14,13 +14,6 @@ from sonar_processing.beams.beam_types import BEAM_TYPES, OWN, AngleUnit, BeamTy
 _REFUSED = "beams refused"
 
 
-class AngleUnitChoice(Enum):
-    TYPE = "TYPE"
-    RADIANS = "RADIANS"
-    DEGREES = "DEGREES"
-    GRADIANS = "GRADIANS"
-
-
 class HeadTurns(Enum):
     TYPE = "TYPE"
     COUNTER_CLOCKWISE = "COUNTER_CLOCKWISE"
@@ -29,8 +22,8 @@ class HeadTurns(Enum):
 
 @dataclass(frozen=True)
 class BeamMessageParameters(ParameterSet):
-    angle_unit: AngleUnitChoice = parameter(
-        AngleUnitChoice.TYPE,
+    angle_unit: AngleUnit = parameter(
+        AngleUnit.TYPE,
         "unit of the head's angle; TYPE: as documented for the message type, or gradians where the values show them",
         tunable=False,
     )
@@ -98,8 +91,8 @@ class BeamReader:
 
     def _unit(self, kind: BeamType, found: List[BeamFields]) -> Optional[AngleUnit]:
         """Return the unit of the angles, None before they have told it."""
-        if self._parameters.angle_unit is not AngleUnitChoice.TYPE:
-            return AngleUnit(self._parameters.angle_unit.value)
+        if self._parameters.angle_unit is not AngleUnit.TYPE:
+            return self._parameters.angle_unit
         if not kind.may_be_gradians:
             return kind.unit
         guess = self._guesses.setdefault(kind.names[0], RadiansOrGradians())
@@ -132,7 +125,7 @@ class BeamReader:
         if OWN in kind.names or (type_name in self._described and not changed):
             return []
         self._described.add(type_name)
-        is_told = self._parameters.angle_unit is AngleUnitChoice.TYPE and unit is not kind.unit
+        is_told = self._parameters.angle_unit is AngleUnit.TYPE and unit is not kind.unit
         told = ", told by their values" if is_told else ""
         way = "clockwise" if self._is_clockwise(kind) else "counter-clockwise"
         text = (

@@ -24,10 +24,9 @@ _SCATTERED = 2.0  # times as far apart as the bins of the usual echo: bins of sp
 class BeamEchoes:
     """The echoes of one scan, seen from above.
 
-    points: (m, 2) float64, x y [m]: the middle of each echo, weighted by strength.
-    weights: (m,) number of cloud points in each. lengths: (m,) from the nearest point of each to the farthest, m.
-    members: (k,) indices of the finite points of the cloud; owner: (k,) the echo that each of them belongs to.
-    time_stamps: (m,) float64, when each echo's beam was taken, s, without the sign that tells still from moving.
+    points: (m, 2) float64, x y [m]: the middle of each echo, weighted by strength. weights: (m,) number of cloud points
+    in each. lengths: (m,) along the beam, m. members: (k,) indices of the finite points of the cloud; owner: (k,) the
+    echo that each of them belongs to. time_stamps: (m,) of the beams, s, without the sign that tells still from moving.
     """
 
     points: np.ndarray
@@ -80,9 +79,8 @@ class Sightings:
     """Echoes in the order of their beams.
 
     points: (n, 2) x y [m]. origins: (n, 2) where the sonar was. beams: (n,) number of the beam, growing; a beam without
-    echoes has a number too. weights: (n,) number of cloud points in each echo.
-    lengths: (n,) of each echo along its beam, m.
-    step: usual angle from beam to beam, rad, in the cloud's frame: a vehicle that turns with its head widens it.
+    echoes has a number too. weights: (n,) number of cloud points in each echo. lengths: (n,) along the beam, m. step:
+    usual angle from beam to beam, rad, in the cloud's frame: a vehicle that turns with its head widens it.
     """
 
     points: np.ndarray
@@ -188,9 +186,8 @@ def _across(offsets: np.ndarray, along: np.ndarray) -> np.ndarray:
 def is_alone(group: Sightings, strong: Sightings, weak: Sightings, clearance: float) -> bool:
     """Return whether no other echo belongs to the surface that a group of echoes shows.
 
-    `strong` are the other echoes that are no noise: each has to be `clearance` [m] away from the group. `weak` are the
-    rest, of few bins: a surface that is heard faintly goes on in them, so that none as strong as half the group's
-    strongest may stand where the next beam would meet it.
+    Of the others the `strong` have to be `clearance` [m] away. A surface that is heard faintly goes on in the `weak`:
+    none half as strong as the group's strongest may stand where the next beam would meet it.
     """
     next_beam = _NEXT_BEAM * group.step * float(group.ranges.mean())
     alike = weak.points[weak.weights >= _ALIKE * group.weights.max()]
