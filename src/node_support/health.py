@@ -46,7 +46,7 @@ class _Input:
         self._newest, self._is_expected = now, False
 
     def silence(self, now: float) -> float:
-        """Return how long [s] it is silent: 0 while it comes as usual and, unless it is expected, before it came twice."""
+        """Return how long [s] it is silent; 0 while it comes as usual, and before it came twice if not expected."""
         seconds = now - self._newest
         return seconds if seconds > SILENCE and (self._is_expected or self._usual.overdue(now) > 0.0) else 0.0
 
