@@ -30,7 +30,7 @@ from sonar_processing.scans.parameters import SonarToCloudParameters
 from sonar_processing.scans.tilt_scan import SonarControlParameters
 from sonar_processing.shapes.circles import CircleDetectorParameters
 from sonar_processing.shapes.lines import LineDetectorParameters
-from sonar_simulator import gazebo_beams
+from sonar_simulator import gazebo_parameters
 from sonar_simulator.simulation.simulation import GROUPS, SimulatorParameters
 from web_page.parameters import WebPageParameters
 
@@ -85,7 +85,7 @@ LIVE_NODES: Dict[str, Type[ParameterSet]] = {
 """Nodes with dynamic_reconfigure."""
 START_UP_NODES: Dict[str, Type[ParameterSet]] = {
     "sonar_simulator": SimulatorParameters,
-    "gazebo_sonar": gazebo_beams.GazeboSonarParameters,
+    "gazebo_sonar": gazebo_parameters.GazeboSonarParameters,
     "thin_link": ThinLinkParameters,
     "web_page": WebPageParameters,
 }
@@ -97,7 +97,7 @@ def generated() -> Dict[Path, str]:
     texts = {
         ROOT / f"yaml/{name}_default.yaml": default_yaml(name, parameters) for name, parameters in LIVE_NODES.items()
     }
-    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_beams.GROUPS, "thin_link": {}, "web_page": {}}
+    groups = {"sonar_simulator": GROUPS, "gazebo_sonar": gazebo_parameters.GROUPS, "thin_link": {}, "web_page": {}}
     for name, parameters in START_UP_NODES.items():
         texts[ROOT / f"yaml/{name}_default.yaml"] = start_up_yaml(name, parameters, groups[name])
     for name, stage in STAGES.items():

@@ -1,18 +1,12 @@
-"""Beams made of what Gazebo's rays hit."""
+"""Parameters of gazebo_sonar."""
 
-import math
 from dataclasses import dataclass
 from enum import Enum
 from typing import Dict, Type
 
-import numpy as np
-
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
-from sonar_simulator.echoes.echo_model import ECHO_MODELS, EchoModel, EchoModelName
-from sonar_simulator.echoes.ray_grid import Rays, contacts_of_grid
-from sonar_simulator.simulation.simulation import Ping
-from sonar_simulator.simulation.sonar_head import SonarHead
+from sonar_simulator.echoes.echo_model import ECHO_MODELS, EchoModelName
 
 
 class HeadMode(Enum):
@@ -58,40 +52,3 @@ class GazeboSonarParameters(StampParameters):
 
 GROUPS: Dict[str, Type[ParameterSet]] = {name: kind.parameters for name, kind in ECHO_MODELS.items()}
 """Groups of parameters, one for each echo model; the one that `echo_model` names is used."""
-
-
-@dataclass(frozen=True)
-class RayScan:
-    """One scan of a ray sensor: its rays, its stamp in ns and its frame."""
-
-    rays: Rays
-    stamp_ns: int
-    frame_id: str
-
-
-class GazeboBeams:
-    """Makes beams from what the rays hit. The same seed and scans give the same beams."""
-
-    def __init__(self, model: EchoModel, seed: int) -> None:
-        self._model = model
-        self._rng = np.random.default_rng(seed)
-
-    @property
-    def max_range(self) -> float:
-        """Far end of the last bin, m."""
-        return self._model.max_range
-
-    def turned(self, scan: RayScan, T_sonar_rays: np.ndarray) -> Ping:
-        """Return the beam of a sensor that has turned to the (4, 4) pose; all its rays belong to the beam."""
-        return self._ping(math.atan2(T_sonar_rays[1, 0], T_sonar_rays[0, 0]), scan.rays)
-
-    def swept(self, scan: RayScan, head: SonarHead, beam: int, opening: float) -> Ping:
-        """Return beam number `beam`, `opening` rad wide, of a sensor that sees the whole circle.
-
-        Raises RefusedInput if there is no ray within it.
-        """
-        angle = head.angle(beam)
-        return self._ping(angle, scan.rays.within(angle, opening))
-
-    def _ping(self, angle: float, rays: Rays) -> Ping:
-        return Ping(angle, self._model.echoes(contacts_of_grid(rays), self._rng)[0])
