@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from sonar_simulator.world.primitives import Mesh
+from sonar_simulator.world.primitives import Mesh, joined
 from sonar_simulator.world.world import FARTHEST, MissingPackageError, WorldError
 
 PATH_VARIABLES = (
@@ -91,12 +91,8 @@ def load_mesh(path: Path, submesh: str = "") -> Mesh:
         parts = [part for part in parts if part[0] == submesh]
         if not parts:
             raise WorldError(f"{path}: no mesh {submesh!r} in it")
-    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int32)], 0
-    for _, corners, triangles in parts:
-        vertices.append(corners)
-        faces.append(triangles + count)
-        count += len(corners)
-    return _checked(path, np.concatenate(vertices) @ _to_metres_z_up(path).T, np.concatenate(faces).astype(np.int32))
+    vertices, faces = joined([(corners, triangles) for _, corners, triangles in parts])
+    return _checked(path, vertices @ _to_metres_z_up(path).T, faces)
 
 
 def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:

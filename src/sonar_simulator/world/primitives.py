@@ -1,6 +1,6 @@
 """Triangle meshes of boxes, cylinders, spheres and planes."""
 
-from typing import Tuple
+from typing import Sequence, Tuple
 
 import numpy as np
 
@@ -51,6 +51,16 @@ def _revolved(radii: np.ndarray, heights: np.ndarray) -> Mesh:
     corners = vertices[faces]
     areas = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
     return vertices, faces[areas > 1e-9 * areas.max()]
+
+
+def joined(meshes: Sequence[Mesh]) -> Mesh:
+    """Return one mesh of all meshes: the vertices (n, 3) and faces (m, 3), int32."""
+    vertices, faces, count = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int32)], 0
+    for corners, triangles in meshes:
+        vertices.append(corners)
+        faces.append(triangles + count)
+        count += len(corners)
+    return np.concatenate(vertices), np.concatenate(faces).astype(np.int32)
 
 
 def _split(quads: np.ndarray) -> np.ndarray:

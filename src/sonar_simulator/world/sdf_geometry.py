@@ -105,7 +105,7 @@ def shape_of(geometry: Element, name: str, pose: np.ndarray, is_collision: bool,
     pose: (4, 4) in the world. Raises ValueError or WorldError that say what is wrong with it.
     """
     if geometry.tag == "plane":
-        return Shape(name, "plane", pose @ _turned_to(_normal(geometry)), _plane_size(geometry, is_collision))
+        return _plane(geometry, name, pose, is_collision)
     if geometry.tag == "mesh":
         return _mesh(geometry, name, pose, beside)
     return Shape(name, geometry.tag, pose, _size(geometry))
@@ -150,6 +150,11 @@ def _named_material(element: Element) -> Material:
     return material
 
 
+def _child_numbers(geometry: Element, key: str, default: Tuple[float, ...]) -> Tuple[float, ...]:
+    element = geometry.find(key)
+    return default if element is None else numbers(element, len(default))
+
+
 def _size(geometry: Element) -> Tuple[float, ...]:
     size: Tuple[float, ...] = ()
     for key, count in _SIZES[geometry.tag]:
@@ -157,28 +162,22 @@ def _size(geometry: Element) -> Tuple[float, ...]:
         if element is None:
             raise ValueError(f"<{geometry.tag}> has no <{key}>")
         size += numbers(element, count)
+    return _positive(geometry, size)
+
+
+def _positive(geometry: Element, size: Tuple[float, ...]) -> Tuple[float, ...]:
     if min(size) <= 0.0:
         raise ValueError(f"<{geometry.tag}> of size {size}, must be above 0 m")
     return size
 
 
-def _plane_size(geometry: Element, is_collision: bool) -> Tuple[float, ...]:
-    """Return the edges, m; the plane of a collision is infinite (sdformat.org), its <size> is only for display."""
-    if is_collision:
-        return (math.inf, math.inf)
-    element = geometry.find("size")
-    size = (1.0, 1.0) if element is None else numbers(element, 2)
-    if min(size) <= 0.0:
-        raise ValueError(f"<plane> of size {size}, must be above 0 m")
-    return size
-
-
-def _normal(geometry: Element) -> np.ndarray:
-    element = geometry.find("normal")
-    normal = np.array((0.0, 0.0, 1.0) if element is None else numbers(element, 3))
+def _plane(geometry: Element, name: str, pose: np.ndarray, is_collision: bool) -> Shape:
+    """Return a plane; that of a collision is infinite (sdformat.org), its <size> is only for display."""
+    normal = np.array(_child_numbers(geometry, "normal", (0.0, 0.0, 1.0)))
     if not normal.any():
         raise ValueError("<normal> of <plane> is 0 0 0, must have a length")
-    return normal / np.linalg.norm(normal)
+    size = (math.inf, math.inf) if is_collision else _child_numbers(geometry, "size", (1.0, 1.0))
+    return Shape(name, "plane", pose @ _turned_to(normal / np.linalg.norm(normal)), _positive(geometry, size))
 
 
 def _turned_to(normal: np.ndarray) -> np.ndarray:
@@ -197,8 +196,7 @@ def _mesh(geometry: Element, name: str, pose: np.ndarray, beside: Path) -> Shape
     path = resolve(uri, beside)
     if path is None:
         raise ValueError(f"<mesh> {uri} is not there, nor on the model path")
-    scale = geometry.find("scale")
-    size = (1.0, 1.0, 1.0) if scale is None else numbers(scale, 3)
+    size = _child_numbers(geometry, "scale", (1.0, 1.0, 1.0))
     if 0.0 in size:
         raise ValueError(f"<scale> of <mesh> is {size}, must not be 0")
     submesh = (geometry.findtext("submesh/name") or "").strip()

@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from node_support.parameters import ParameterError
-from sonar_simulator.world.primitives import MESHES, Mesh
+from sonar_simulator.world.primitives import MESHES, Mesh, joined
 
 
 class WorldError(ParameterError):
@@ -122,20 +122,12 @@ class World:
 
     @classmethod
     def from_shapes(cls, name: str, shapes: Sequence[Shape]) -> "World":
-        vertices, faces = [np.empty((0, 3))], [np.empty((0, 3), dtype=np.int32)]
+        meshes = [shape.triangles() for shape in shapes]
+        vertices, faces = joined(meshes)
         materials: Dict[Material, int] = {}
-        face_material = [np.empty(0, dtype=np.intp)]
-        count = 0
-        for shape in shapes:
-            corners, triangles = shape.triangles()
-            vertices.append(corners)
-            faces.append(triangles + count)
-            face_material.append(np.full(len(triangles), materials.setdefault(shape.material, len(materials))))
-            count += len(corners)
-        return cls(
-            name, np.concatenate(vertices), np.concatenate(faces).astype(np.int32), tuple(shapes),
-            np.concatenate(face_material), tuple(materials),
-        )  # fmt: skip
+        numbers = [materials.setdefault(shape.material, len(materials)) for shape in shapes]
+        face_material = np.repeat(np.array(numbers, dtype=np.intp), [len(triangles) for _, triangles in meshes])
+        return cls(name, vertices, faces, tuple(shapes), face_material, tuple(materials))
 
     @cached_property
     def normals(self) -> np.ndarray:
