@@ -64,23 +64,9 @@ class LoggedPing:
     def encode(self) -> bytes:
         """Return the bytes of the record; raise FrameError for a value that a record cannot hold."""
         kind = self.reply.kind
-        record = bytearray(_RECORD_LENGTHS[kind])
-        record[0:3] = MAGIC
-        record[3] = _INDICES[kind]
-        record[4:6] = len(record).to_bytes(2, "big")
-        record[6:8] = kind.length.to_bytes(2, "big")
-        record[8:33] = _encoded_stamp(self.stamp)
-        for index, value in {**_CONSTANT, **self._header_bytes()}.items():
-            require(f"byte {index} of the log record", value, range(256))
-            record[index] = value
-        record[HEADER_LENGTH : HEADER_LENGTH + kind.length] = self.reply.encode()
-        return bytes(record)
-
-    def _header_bytes(self) -> dict:
-        polar = self.reply.kind is ReplyKind.IMX
         require("step_code", self.step_code, range(8))
-        return {
-            37: self.clockwise << 7 | self.transducer_up << 6 | polar << 3 | self.step_code,
+        header = {
+            37: self.clockwise << 7 | self.transducer_up << 6 | (kind is ReplyKind.IMX) << 3 | self.step_code,
             38: self.start_gain_db,
             39: self.sector_width_deg // 3,
             40: self.train_angle_deg // 3 + _ZERO_TRAIN,
@@ -89,6 +75,17 @@ class LoggedPing:
             87: int(self.frequency_khz == 850),
             88: self.reply.head_id,
         }
+        record = bytearray(_RECORD_LENGTHS[kind])
+        record[0:3] = MAGIC
+        record[3] = _INDICES[kind]
+        record[4:6] = len(record).to_bytes(2, "big")
+        record[6:8] = kind.length.to_bytes(2, "big")
+        record[8:33] = _encoded_stamp(self.stamp)
+        for index, value in {**_CONSTANT, **header}.items():
+            require(f"byte {index} of the log record", value, range(256))
+            record[index] = value
+        record[HEADER_LENGTH : HEADER_LENGTH + kind.length] = self.reply.encode()
+        return bytes(record)
 
 
 def decode_record(record: bytes) -> LoggedPing:
@@ -217,14 +214,11 @@ class LogReader:
             ping = decode_record(self._data[position:reply_end])
         except FrameError as error:
             return None, self._next_header(position + 1, len(self._data)), str(error)
-        return self._after_fill(ping, reply_end, position + _RECORD_LENGTHS[kind])
-
-    def _after_fill(self, ping: LoggedPing, start: int, end: int) -> Tuple[LoggedPing, int, str]:
-        """Skip the zero fill after a ping; it ends early where the file was cut off."""
-        fill = self._data[start:end]
+        end = position + _RECORD_LENGTHS[kind]
+        fill = self._data[reply_end:end]
         zeros = len(fill) - len(fill.lstrip(b"\0"))
-        if start + zeros < end:
-            return ping, start + zeros, "the zero fill of a ping is cut short"
+        if reply_end + zeros < end:
+            return ping, reply_end + zeros, "the zero fill of a ping is cut short"
         return ping, end, ""
 
     def _next_header(self, start: int, end: int) -> int:

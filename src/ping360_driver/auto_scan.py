@@ -45,9 +45,10 @@ class AutoScan:
         """Wait for the next beam of the scan; note in `outcome` what comes."""
         if command != self._running:
             self._start(command)
-        self._wait(outcome, command, self._patience(command))
+        patience = _PATIENCE * beam_time(command.step, command.pulse, self._baud_rate) + self._margin
+        self._wait(outcome, command, patience)
         while not outcome.is_over and self._is_turning() and self._answers(outcome, command):
-            self._wait(outcome, command, self._patience(command))
+            self._wait(outcome, command, patience)
         if not outcome.is_over:
             self._revive(outcome, command)
 
@@ -83,9 +84,6 @@ class AutoScan:
         self._line.send(INFORMATION_REQUEST)
         self._wait(outcome, command, _ANSWER_TIME, until_alive=True)
         return self._is_alive
-
-    def _patience(self, command: ScanCommand) -> float:
-        return _PATIENCE * beam_time(command.step, command.pulse, self._baud_rate) + self._margin
 
     def _is_turning(self) -> bool:
         """Return whether the head may still be on its way to the start of the sector."""

@@ -129,7 +129,9 @@ class MessageStream:
             else:
                 if len(self._buffer) < length and not self._holds_another():
                     break
-                self._give_up()
+                # The next one may lie inside it, where its own end is lost.
+                self._stretch_headers += 1
+                self._skip_rubbish(len(START))
         return found
 
     def reset(self) -> None:
@@ -169,11 +171,6 @@ class MessageStream:
                 return True
             start = self._buffer.find(START, start + 1)
         return False
-
-    def _give_up(self) -> None:
-        """Count the message at the front as broken; look for the next one inside it, where its own end may be lost."""
-        self._stretch_headers += 1
-        self._skip_rubbish(len(START))
 
     def _skip_rubbish(self, count: int) -> None:
         """Drop bytes of a stretch between whole messages, and count the messages that it was."""

@@ -58,18 +58,10 @@ def turning_time(gradians: int) -> float:
     return _SLOWEST_TURN * gradians / TURN
 
 
-def sending_time(pulse: PulseSettings, baud_rate: float) -> float:
-    """Return how long a beam takes on the line, in seconds."""
-    length = HEADER_LENGTH + _BEAM_HEADER + pulse.number_of_samples + CHECKSUM_LENGTH
-    return transmission_time(length, baud_rate)
-
-
 def beam_time(step: int, pulse: PulseSettings, baud_rate: float) -> float:
-    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds.
-
-    baud_rate: bits per second.
-    """
-    return turning_time(step) + pulse.listening_time + sending_time(pulse, baud_rate)
+    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds."""
+    length = HEADER_LENGTH + _BEAM_HEADER + pulse.number_of_samples + CHECKSUM_LENGTH
+    return turning_time(step) + pulse.listening_time + transmission_time(length, baud_rate)
 
 
 class RequestScan:

@@ -49,20 +49,12 @@ class DriverHealth(Health):
         read_stats: Callable[[], LineStats],
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
-        """`read_stats` returns the newest counts."""
         super().__init__(name, warn, clock)
         self._read_stats = read_stats
         self._seen: Dict[str, int] = {}
 
     def report(self) -> HealthReport:
         stats = self._read_stats()
-        self._note(stats)
-        report = super().report()
-        if stats.connected:
-            return report
-        return replace(report, level=Level.ERROR, text=f"not connected: {stats.last_error or 'not opened yet'}")
-
-    def _note(self, stats: LineStats) -> None:
         self.show("connected", str(stats.connected).lower())
         self.show("last error", stats.last_error)
         self.show("connections", str(stats.connections))
@@ -74,6 +66,10 @@ class DriverHealth(Health):
             self._note_problem(kind, hint, getattr(stats, kind.replace(" ", "_")))
         losses = max(0, stats.connections - int(stats.connected))
         self._note_problem("losses of the port", stats.last_error, losses)
+        report = super().report()
+        if stats.connected:
+            return report
+        return replace(report, level=Level.ERROR, text=f"not connected: {stats.last_error or 'not opened yet'}")
 
     def _note_problem(self, kind: str, detail: str, total: int) -> None:
         seen = self._seen.get(kind, 0)

@@ -5,7 +5,7 @@ import threading
 import time
 from argparse import Namespace
 from dataclasses import replace
-from typing import List, Optional
+from typing import Optional
 
 import rospy
 from dynamic_reconfigure.encoding import decode_config
@@ -31,17 +31,6 @@ _WAIT_STEP = 0.05  # s: soon enough for a person
 
 def run_player() -> None:
     """Publish a log, then end; several may play at once."""
-    options = play_arguments(rospy.myargv()[1:])
-    run(anonymous_name("play_852"), lambda: LogPlayer(options))
-
-
-def run_recorder() -> None:
-    options = record_arguments(rospy.myargv()[1:])
-    run("record_852", lambda: LogRecorder(options))
-
-
-def play_arguments(arguments: List[str]) -> Namespace:
-    """Return file, rate, loop, wait_for_subscribers, frame_id and inverted; exits on a bad command line."""
     parser = CommandLine("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
     parser.add_argument("--rate", type=positive, help="pings per second (default: as logged, or 10 without times)")
@@ -49,15 +38,16 @@ def play_arguments(arguments: List[str]) -> Namespace:
     parser.add_argument("--wait-for-subscribers", action="store_true", help="start when somebody subscribes")
     parser.add_argument("--frame-id", default="sonar", help="frame of the head")
     parser.add_argument("--inverted", action="store_true", help="the head was mounted upside down")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(rospy.myargv()[1:])
+    run(anonymous_name("play_852"), lambda: LogPlayer(options))
 
 
-def record_arguments(arguments: List[str]) -> Namespace:
-    """Return file and driver; exits on a bad command line."""
+def run_recorder() -> None:
     parser = CommandLine("record_852", description="Append the beams of sonar/raw to a .852 log.")
     parser.add_argument("file", help="log to append to")
     parser.add_argument("--driver", default="imagenex_852_driver", help="node whose settings go into the log")
-    return parser.parse_args(arguments)
+    options = parser.parse_args(rospy.myargv()[1:])
+    run("record_852", lambda: LogRecorder(options))
 
 
 class LogPlayer:
@@ -113,7 +103,10 @@ class LogPlayer:
 
     def _end(self) -> None:
         self._ended.set()
-        print(f"play_852: {self._published} beams published; {summary(self._reader)}")
+        damages = self._reader.damages
+        told = "; ".join(str(damage) for damage in damages[:3])
+        skipped = f", skipped {len(damages)} damaged parts: {told}" if damages else ""
+        print(f"play_852: {self._published} beams published; {self._reader.ping_count} pings in the log{skipped}")
 
 
 class LogRecorder:
@@ -196,10 +189,3 @@ def opened(path: str) -> LogReader:
         return LogReader(path)
     except OSError as error:
         raise StartError(f"{path}: {error.strerror}") from error
-
-
-def summary(reader: LogReader) -> str:
-    """Return in words what the part of a log that was read contains."""
-    damages = "; ".join(str(damage) for damage in reader.damages[:3])
-    skipped = f", skipped {len(reader.damages)} damaged parts: {damages}" if damages else ""
-    return f"{reader.ping_count} pings in the log{skipped}"

@@ -185,15 +185,11 @@ def _nearest_points(triangles: np.ndarray, planes: np.ndarray) -> np.ndarray:
     within = (_dot(sides, feet[:, np.newaxis]) >= offsets - _TOLERANCE).all(axis=1)
     points = np.where(within[:, np.newaxis], feet, np.inf)
     rest = np.flatnonzero(~within)
-    axes = _axes(normals[rest], edges[rest, 0])
+    along = edges[rest, 0] / np.sqrt(_dot(edges[rest, 0], edges[rest, 0]))[:, np.newaxis]
+    # Unit vectors that span the planes of the triangles.
+    axes = np.stack([along, _cross(normals[rest], along)], axis=1)
     points[rest] = _nearest_on_sides(axes, feet[rest], sides[rest], offsets[rest])
     return points
-
-
-def _axes(normals: np.ndarray, edges: np.ndarray) -> np.ndarray:
-    """Return (p, 2, 3) unit vectors that span the planes of triangles with these unit normals and edges, (p, 3)."""
-    first = edges / np.sqrt(_dot(edges, edges))[:, np.newaxis]
-    return np.stack([first, _cross(normals, first)], axis=1)
 
 
 def _nearest_on_sides(axes: np.ndarray, feet: np.ndarray, sides: np.ndarray, offsets: np.ndarray) -> np.ndarray:

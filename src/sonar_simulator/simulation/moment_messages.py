@@ -72,7 +72,9 @@ class MomentMessages(Messages):
     def placing(self, moment: Moment, stamp: Any, instruments: Instruments) -> _Told:
         """Return the (topic, message) pairs that place vehicle and sonar, the transform, if there is one, first."""
         pose = moment.odometry.T_odom_base
-        joint = (topics.JOINT_STATES, self._joint_state(moment.tilt, stamp))
+        state = self.stamped("sensor_msgs/JointState", stamp, "")
+        state.name, state.position = [SERVO_JOINT], np.array([moment.tilt])
+        joint = (topics.JOINT_STATES, state)
         if instruments is not Instruments.COMPASS:
             transform = self.transform(Placing.of(pose), stamp, ODOM_FRAME, BASE_FRAME)
             return [(topics.TRANSFORMS, self.transforms([transform])), joint]
@@ -111,11 +113,6 @@ class MomentMessages(Messages):
     def _odometry(self, pose: np.ndarray, twist: np.ndarray, stamp: Any, frame: str) -> Any:
         message = self.odometry(Placing.of(pose), stamp, frame, BASE_FRAME)
         _move(message.twist.twist, twist)
-        return message
-
-    def _joint_state(self, tilt: float, stamp: Any) -> Any:
-        message = self.stamped("sensor_msgs/JointState", stamp, "")
-        message.name, message.position = [SERVO_JOINT], np.array([tilt])
         return message
 
 

@@ -89,13 +89,12 @@ class Sonar:
 
         Any number of beams is allowed: they are processed in batches that fit into memory.
         """
-        starts = range(0, len(angles), _BATCH)
-        batches = [self._batch(T_world_sonar[i : i + _BATCH], angles[i : i + _BATCH]) for i in starts]
-        return np.concatenate([np.empty((0, self._model.bins), dtype=np.uint8), *batches])
-
-    def _batch(self, T_world_sonar: np.ndarray, angles: np.ndarray) -> np.ndarray:
-        contacts = self._tracer.contacts(T_world_sonar, angles, self._model.max_range, self._rng)
-        return self._model.echoes(contacts, self._rng)
+        batches = [np.empty((0, self._model.bins), dtype=np.uint8)]
+        for start in range(0, len(angles), _BATCH):
+            poses, turns = T_world_sonar[start : start + _BATCH], angles[start : start + _BATCH]
+            contacts = self._tracer.contacts(poses, turns, self._model.max_range, self._rng)
+            batches.append(self._model.echoes(contacts, self._rng))
+        return np.concatenate(batches)
 
 
 _SPREAD = 0.15  # m: the length of a real head's usual pulse of 100 us
