@@ -22,7 +22,7 @@ from mlsm_manager.offline.picture import draw_map
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.surface_map.map_file import read_map
 from node_support.files import write_whole
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 from underwater_map_construction.srv import SaveMap
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -159,7 +159,7 @@ def leave_results(watch: Watch, seconds: float, output: Path) -> None:
     if not answer.success:
         raise DemoError(answer.message)
     blocks = read_map(output / "map.mlsm").shown
-    outlines = load_sdf(ROOT / "worlds/basin.sdf").world.outlines()
+    outlines = load_world(ROOT / "worlds/basin.sdf").outlines()
     # No line leads from one outline to the next.
     lines = np.concatenate([np.append(np.asarray(one)[:, :2], [[np.nan, np.nan]], axis=0) for one in outlines])
     walls = Trajectory("walls as they are", "#1f5fa8", np.zeros(len(lines)), lines)

@@ -21,7 +21,7 @@ from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarParameters
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 
 _START, _BEAM_SECONDS = 1000.0, 0.06  # s; a Ping360 at 40 m
 _STEP, _STEPS = np.radians(1.8), 200
@@ -73,7 +73,7 @@ def simulated_head(motion: str, seed: int, sector: Optional[int] = None) -> Simu
     model = make_echo_model("laser_cone", {"max_range": water.reach, "spread": 0.004 * water.reach, "bins": 600})
     rows, columns = RAYS[45]
     pattern = SonarParameters(ray_rows=rows, ray_columns=columns).pattern()
-    sonar = Sonar(RayCaster(load_sdf(ROOT / f"worlds/{name}.sdf").world), pattern, model, rng)
+    sonar = Sonar(RayCaster(load_world(ROOT / f"worlds/{name}.sdf")), pattern, model, rng)
     places = matrices(path.poses)
     places[:, 2, 3] = DEPTH if name != "tank" else -1.2
     strengths = sonar.pings(places, angles).astype(np.float64) * rng.gamma(4.0, 0.25, (len(angles), 1))

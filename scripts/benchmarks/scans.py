@@ -21,7 +21,7 @@ from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.echoes.thesis_models import LaserCone, LaserConeParameters
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters
 from sonar_simulator.world.world import Shape, World
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 
 RAYS = {15: (5, 3), 45: (15, 3), 150: (30, 5), 500: (50, 10)}
 HEAD = SonarHead(beams_per_turn=120, seconds_per_turn=16.0)
@@ -29,7 +29,7 @@ DEPTH = -2.0
 _FLOOR = Shape("floor", "box", pose_matrix((0.0, 0.0, -6.0)), (400.0, 400.0, 1.0))
 _WALL = Shape("wall", "box", pose_matrix((0.0, 15.5, -2.5)), (400.0, 1.0, 6.0))
 WORLDS: dict = {
-    "basin": lambda: load_sdf(ROOT / "worlds/basin.sdf").world,
+    "basin": lambda: load_world(ROOT / "worlds/basin.sdf"),
     "empty sea": lambda: World.from_shapes("empty sea", [_FLOOR]),
     "straight wall": lambda: World.from_shapes("straight wall", [_FLOOR, _WALL]),
 }

@@ -31,7 +31,7 @@ def rows() -> List[Row]:
 
 def _beam_rows() -> List[Row]:
     """Measure whole beams, rays to strengths, in the harbour: in batches of 120, and one by one as when live."""
-    world = load_world(ROOT / "worlds/harbour.sdf").world
+    world = load_world(ROOT / "worlds/harbour.sdf")
     caster, angles = RayCaster(world), np.arange(120) * math.radians(3.0)
     poses = np.repeat(pose_matrix((0.0, 0.0, -2.0))[np.newaxis], len(angles), axis=0)
     rows = []

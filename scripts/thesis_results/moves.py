@@ -174,7 +174,7 @@ def _summary(runs: List[List[Scan]], make_estimator: Callable[[], Estimator]) ->
 
 
 def _picture(pictures: Pictures, found: List[Fix]) -> str:
-    world = load_world(ROOT / "worlds/basin.sdf").world
+    world = load_world(ROOT / "worlds/basin.sdf")
     figure, (axes,) = new_figure(18.0, 6.5, 1, len(MOVES))
     for cell, fix, move in zip(axes, found, MOVES):
         _draw_fix(cell, fix, world, move)

@@ -40,7 +40,7 @@ _MOST_POINTS = 60_000  # of a picture: more do not show
 
 def make_simulated(pictures: Pictures) -> str:
     """Return the section of a simulated scan of 50 m."""
-    world = load_world(ROOT / "worlds/basin.sdf").world
+    world = load_world(ROOT / "worlds/basin.sdf")
     found = {name: _scan(spread) for name, spread in _SPREADS.items()}
     shown = [
         draw_stages(

@@ -58,7 +58,7 @@ def make_simulated(pictures: Pictures) -> str:
     """Return the section of what the models hear."""
     figure, axes = new_figure(15.0, 11.0, len(_VIEWS), 1 + len(ECHO_MODELS))
     for row, (name, place, reach) in zip(axes, _VIEWS):
-        world = load_world(ROOT / f"worlds/{name}.sdf").world
+        world = load_world(ROOT / f"worlds/{name}.sdf")
         draw_world(row[0], world, place)
         row[0].plot(0.0, 0.0, "r.")
         to_scale(row[0], f"{name}, from above", reach)
@@ -82,7 +82,7 @@ def make_simulated(pictures: Pictures) -> str:
 
 def make_852(pictures: Pictures) -> str:
     """Return the section of an Imagenex 852 that is emulated byte by byte."""
-    world = load_world(ROOT / "worlds/basin.sdf").world
+    world = load_world(ROOT / "worlds/basin.sdf")
     figure, (axes,) = new_figure(18.0, 4.6, 1, 1 + len(_SETTINGS_852))
     for cell, (title, changes) in zip(axes, _SETTINGS_852.items()):
         settings = HeadSettings(frequency_khz=850, **changes)
@@ -160,7 +160,7 @@ def _turn(beams: List[Beam]) -> Turn:
 def _in_tank(angles: np.ndarray, model_name: str) -> Turn:
     """Return what a model hears in worlds/tank.sdf with the parameters of yaml/sonar_simulator_tank.yaml."""
     parameters = yaml.safe_load((ROOT / "yaml/sonar_simulator_tank.yaml").read_text())
-    caster = RayCaster(load_world(ROOT / "worlds/tank.sdf").world)
+    caster = RayCaster(load_world(ROOT / "worlds/tank.sdf"))
     model = make_echo_model(model_name, parameters[model_name])
     sonar = Sonar(caster, SonarParameters(**parameters["sonar"]).pattern(), model, np.random.default_rng(1))
     return Turn(angles, sonar.pings(np.repeat(HEAD_PLACE[np.newaxis], len(angles), axis=0), angles), _REACH)

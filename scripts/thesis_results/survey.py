@@ -43,7 +43,7 @@ _SEEN_FROM = np.radians([-50.0, 38.0])  # direction and elevation: over the open
 
 def make(pictures: Pictures) -> str:
     """Return the section."""
-    world = load_world(ROOT / "worlds/harbour.sdf").world
+    world = load_world(ROOT / "worlds/harbour.sdf")
     found = {name: surveyed(world, *head) for name, head in _SURVEYS.items()}
     by_thesis = surveyed(world, *_SURVEYS["long range, 50 m"], CHAIN, PARAMETERS.resolution)
     return joined(

@@ -155,13 +155,12 @@ class Simulation:
         model = make_echo_model(parameters.echo_model.value, settings.echo.to_mapping())
         script = load_script(folder / Path(parameters.script).expanduser())
         self.T_base_sonar = robot.mount(BASE_FRAME, SONAR_FRAME)
-        loaded = load_world(folder / Path(parameters.world).expanduser())
-        for warning in loaded.warnings:
+        self.world = load_world(folder / Path(parameters.world).expanduser())
+        for warning in self.world.warnings:
             warn(warning)
         # Separate streams, so that a change of the odometry's noise does not change the beams.
         beams, measurements = (np.random.default_rng(s) for s in np.random.SeedSequence(parameters.seed).spawn(2))
-        self.world = loaded.world
-        self.sonar = Sonar(RayCaster(loaded.world), settings.sonar.pattern(), model, beams)
+        self.sonar = Sonar(RayCaster(self.world), settings.sonar.pattern(), model, beams)
         self.servo = Servo(settings.servo)
         self.commanded = CommandedVehicle(settings.vehicle, script.start)
         self.T_world_start = script.pose(0.0)

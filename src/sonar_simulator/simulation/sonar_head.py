@@ -135,6 +135,6 @@ def world_echoes(parameters: EmulatedHeadParameters, place: Optional[Place] = No
         vertical_opening_deg=parameters.beam_height_deg, horizontal_opening_deg=parameters.beam_width_deg
     )
     try:
-        return WorldEchoes(load_world(parameters.world_file).world, place or (lambda: pose), parameters.seed, sonar)
+        return WorldEchoes(load_world(parameters.world_file), place or (lambda: pose), parameters.seed, sonar)
     except WorldError as error:
         raise ParameterError(f"world_file: {error}") from error

@@ -110,7 +110,8 @@ class Shape:
 class World:
     """Everything that reflects sound: vertices (n, 3) float64 in m, faces (m, 3) int32, and the shapes they come from.
 
-    face_material: (m,) index of each face's material into `materials`.
+    face_material: (m,) index of each face's material into `materials`. warnings: one line for each part of the file
+    that could not be loaded.
     """
 
     name: str
@@ -119,15 +120,16 @@ class World:
     shapes: Tuple[Shape, ...]
     face_material: np.ndarray
     materials: Tuple[Material, ...]
+    warnings: Tuple[str, ...] = ()
 
     @classmethod
-    def from_shapes(cls, name: str, shapes: Sequence[Shape]) -> "World":
+    def from_shapes(cls, name: str, shapes: Sequence[Shape], warnings: Sequence[str] = ()) -> "World":
         meshes = [shape.triangles() for shape in shapes]
         vertices, faces = joined(meshes)
         materials: Dict[Material, int] = {}
         numbers = [materials.setdefault(shape.material, len(materials)) for shape in shapes]
         face_material = np.repeat(np.array(numbers, dtype=np.intp), [len(triangles) for _, triangles in meshes])
-        return cls(name, vertices, faces, tuple(shapes), face_material, tuple(materials))
+        return cls(name, vertices, faces, tuple(shapes), face_material, tuple(materials), tuple(warnings))
 
     @cached_property
     def normals(self) -> np.ndarray:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import List, Tuple, Union
+from typing import List, Union
 from xml.etree import ElementTree as ET
 from xml.etree.ElementTree import Element
 
@@ -24,33 +24,19 @@ _GROUND_PLANE = ET.fromstring(
 )
 
 
-@dataclass(frozen=True)
-class LoadedWorld:
-    """A world, and one line for each part of its file that could not be loaded."""
-
-    world: World
-    warnings: Tuple[str, ...]
-
-
-def load_world(path: Union[str, Path]) -> LoadedWorld:
+def load_world(path: Union[str, Path]) -> World:
     """Read a world: a mesh if the file's name ends like one, SDF otherwise.
 
-    Raises WorldError if the file cannot be loaded; a part of an SDF file that cannot be loaded becomes a warning.
+    Raises WorldError if the file cannot be read, is neither or contains no shape at all; a part of an SDF file that
+    cannot be loaded becomes a warning, and the rest is loaded.
     """
     path = Path(path)
-    if path.suffix.lower() not in MESH_SUFFIXES:
-        return load_sdf(path)
-    shape = Shape(path.stem, "mesh", np.eye(4), (1.0, 1.0, 1.0), mesh=load_mesh(path))
-    return LoadedWorld(World.from_shapes(path.stem, [shape]), ())
-
-
-def load_sdf(path: Union[str, Path]) -> LoadedWorld:
-    """Read a world file. A part that cannot be loaded becomes a warning, and the rest is loaded.
-
-    Raises WorldError if the file cannot be read, is not XML, is not SDF or contains no shape at all.
-    """
+    if path.suffix.lower() in MESH_SUFFIXES:
+        return World.from_shapes(
+            path.stem, [Shape(path.stem, "mesh", np.eye(4), (1.0, 1.0, 1.0), mesh=load_mesh(path))]
+        )
     root = _parsed(path)
-    reader = _Reader(Path(path), [], [])
+    reader = _Reader(path, [], [])
     if root.get("version") not in VERSIONS:
         reader.warn(f"sdf version={root.get('version')}", f"read as {VERSIONS[-1]}")
     world = root.find("world")
@@ -58,7 +44,7 @@ def load_sdf(path: Union[str, Path]) -> LoadedWorld:
     if not reader.shapes:
         raise WorldError("; ".join([f"{path}: no {', '.join(GEOMETRIES)} in it", *reader.warnings]))
     name = None if world is None else world.get("name")
-    return LoadedWorld(World.from_shapes(name or Path(path).stem, reader.shapes), tuple(reader.warnings))
+    return World.from_shapes(name or path.stem, reader.shapes, reader.warnings)
 
 
 @dataclass(frozen=True)
@@ -75,7 +61,7 @@ class _Place:
         return _Place(self.pose @ pose, name, material, self.depth)
 
 
-def _parsed(path: Union[str, Path]) -> Element:
+def _parsed(path: Path) -> Element:
     try:
         root = ET.parse(str(path)).getroot()
     except OSError as error:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 
 
 @pytest.fixture
@@ -13,6 +13,6 @@ def load(tmp_path):
         path = tmp_path / "some.sdf"
         namespace = 'xmlns:sonar="https://example.org"'
         path.write_text(f'<sdf version="{version}" {namespace}><world name="here">{content}</world></sdf>')
-        return load_sdf(path)
+        return load_world(path)
 
     return load_text

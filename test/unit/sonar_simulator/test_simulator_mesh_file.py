@@ -110,7 +110,7 @@ def test_a_bare_mesh_is_a_world(tmp_path, box):
     path = tmp_path / "wreck.stl"
     box.export(str(path))
     loaded = load_world(path)
-    assert (loaded.world.name, loaded.warnings, len(loaded.world.faces)) == ("wreck", (), 12)
+    assert (loaded.name, loaded.warnings, len(loaded.faces)) == ("wreck", (), 12)
 
 
 def test_any_other_file_is_taken_for_sdf(tmp_path):

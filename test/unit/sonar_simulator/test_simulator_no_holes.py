@@ -42,7 +42,7 @@ def differences(name, model_name, rays=(9, 5)):
 
     A beam that is silent counts as one whose first echo is in the bin after the last, on both sides.
     """
-    world = load_world(WORLDS / f"{name}.sdf").world
+    world = load_world(WORLDS / f"{name}.sdf")
     model = make_echo_model(model_name, {**NOISE_FREE[model_name], "max_range": RANGES[name]})
     pattern = model.pattern(SonarParameters(ray_rows=rays[0], ray_columns=rays[1]).pattern())
     tracer = BeamTracer(RayCaster(world), pattern, model.mirrors)

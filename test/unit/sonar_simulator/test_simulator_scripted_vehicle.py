@@ -117,7 +117,7 @@ def test_every_third_scan_of_a_tour_is_still(name, scans):
 def test_a_tour_keeps_its_distance_from_everything(name, distance):
     times = np.arange(0.0, TOURS[name].duration, 0.2)
     path = np.array([TOURS[name].pose(time)[:2, 3] for time in times])
-    world = load_world(ROOT / "worlds" / f"{name}.sdf").world
+    world = load_world(ROOT / "worlds" / f"{name}.sdf")
     for outline in world.outlines():
         assert _distance_to_polyline(path, outline) > distance
 
@@ -126,7 +126,7 @@ def test_a_tour_keeps_its_distance_from_everything(name, distance):
 def test_a_tour_stays_between_surface_and_bottom(name):
     times = np.arange(0.0, TOURS[name].duration, 1.0)
     path = np.array([TOURS[name].pose(time)[:3, 3] for time in times])
-    caster = RayCaster(load_world(ROOT / "worlds" / f"{name}.sdf").world)
+    caster = RayCaster(load_world(ROOT / "worlds" / f"{name}.sdf"))
     below = caster.hits(path, np.tile([0.0, 0.0, -1.0], (len(path), 1)))[0]
     assert path[:, 2].max() < -0.5
     assert below.min() > 0.6

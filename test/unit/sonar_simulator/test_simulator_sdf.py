@@ -11,7 +11,7 @@ from programs import ROOT
 from node_support.geometry import pose_matrix
 from sonar_simulator.world.sdf_geometry import Scope, own_pose
 from sonar_simulator.world.world import WorldError
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 
 BASIN = ROOT / "worlds" / "basin.sdf"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
@@ -27,7 +27,7 @@ def test_poses_of_model_link_and_collision_nest(load):
         '<model name="m"><pose>10 0 0 0 0 1.5707963267948966</pose><link name="l"><pose>1 0 0 0 0 0</pose>'
         f'<collision name="c"><pose>0 2 3 0 0 0</pose>{BOX}</collision></link></model>'
     )
-    (shape,) = loaded.world.shapes
+    (shape,) = loaded.shapes
     np.testing.assert_allclose(shape.pose[:3, 3], (8, 1, 3), atol=1e-12)
     np.testing.assert_allclose(shape.pose[:3, 0], (0, 1, 0), atol=1e-12)
 
@@ -35,7 +35,7 @@ def test_poses_of_model_link_and_collision_nest(load):
 def test_roll_pitch_yaw_turn_about_fixed_axes(load):
     quarter = np.pi / 2
     pose = f"<pose>0 0 0 {quarter} 0 {quarter}</pose>"
-    (shape,) = load(_model(f'<collision name="c">{BOX}</collision>', pose)).world.shapes
+    (shape,) = load(_model(f'<collision name="c">{BOX}</collision>', pose)).shapes
     np.testing.assert_allclose(shape.pose[:3, :3] @ (0, 1, 0), (0, 0, 1), atol=1e-12)
     np.testing.assert_allclose(shape.pose[:3, :3] @ (1, 0, 0), (0, 1, 0), atol=1e-12)
 
@@ -48,7 +48,7 @@ def test_roll_pitch_yaw_turn_about_fixed_axes(load):
     ],
 )
 def test_a_link_is_seen_by_its_collisions_and_else_by_its_visuals(load, content, kind):
-    assert [shape.kind for shape in load(_model(content)).world.shapes] == [kind]
+    assert [shape.kind for shape in load(_model(content)).shapes] == [kind]
 
 
 def test_an_include_is_one_warning_that_names_its_uri(load):
@@ -71,7 +71,7 @@ def test_an_include_is_one_warning_that_names_its_uri(load):
 )
 def test_a_broken_shape_is_one_warning_and_the_rest_loads(load, broken):
     loaded = load(_model(f'<collision name="bad">{broken}</collision><collision name="c">{BOX}</collision>'))
-    assert [shape.name for shape in loaded.world.shapes] == ["m/l/c"]
+    assert [shape.name for shape in loaded.shapes] == ["m/l/c"]
     (warning,) = loaded.warnings
     assert "some.sdf: m/l/bad" in warning
 
@@ -79,7 +79,7 @@ def test_a_broken_shape_is_one_warning_and_the_rest_loads(load, broken):
 def test_a_model_with_a_broken_pose_is_one_warning_and_the_rest_loads(load):
     shape = f'<collision name="c">{BOX}</collision>'
     loaded = load(_model(shape, "<pose>here</pose>") + _model(shape))
-    assert len(loaded.world.shapes) == len(loaded.warnings) == 1
+    assert len(loaded.shapes) == len(loaded.warnings) == 1
 
 
 def test_an_unknown_version_is_a_warning(load):
@@ -89,7 +89,7 @@ def test_an_unknown_version_is_a_warning(load):
 
 def test_a_missing_file_is_refused_with_its_path(tmp_path):
     with pytest.raises(WorldError, match=r"none\.sdf.*No such file"):
-        load_sdf(tmp_path / "none.sdf")
+        load_world(tmp_path / "none.sdf")
 
 
 @pytest.mark.parametrize(("text", "reason"), [("<sdf>", "not XML"), ("<robot/>", "not an SDF file")])
@@ -97,7 +97,7 @@ def test_a_file_that_is_no_sdf_is_refused_with_its_path(tmp_path, text, reason):
     path = tmp_path / "odd.sdf"
     path.write_text(text)
     with pytest.raises(WorldError, match=rf"odd\.sdf.*{reason}"):
-        load_sdf(path)
+        load_world(path)
 
 
 def test_a_world_without_shapes_is_refused_and_says_what_was_left_out(load):
@@ -106,7 +106,7 @@ def test_a_world_without_shapes_is_refused_and_says_what_was_left_out(load):
 
 
 def test_the_basin_is_120_by_50_by_5_5_m_inside():
-    shapes = {shape.name: shape for shape in load_sdf(BASIN).world.shapes}
+    shapes = {shape.name: shape for shape in load_world(BASIN).shapes}
     assert shapes["basin/east_wall/box"].triangles()[0][:, 0].min() == 60.0
     assert shapes["basin/west_wall/box"].triangles()[0][:, 0].max() == -60.0
     assert shapes["basin/north_wall/box"].triangles()[0][:, 1].min() == 25.0
@@ -140,7 +140,7 @@ def test_poses_of_models_in_models_multiply(tmp_path_factory, poses):
     path = tmp_path_factory.getbasetemp() / "nested.sdf"
     path.write_text(f'<sdf version="1.6"><world name="w">{content}</world></sdf>')
     expected = np.linalg.multi_dot([np.eye(4), np.eye(4), *map(_matrix, poses)])
-    (shape,) = load_sdf(path).world.shapes
+    (shape,) = load_world(path).shapes
     np.testing.assert_allclose(shape.pose, expected, atol=1e-9)
     assert shape.name == "/".join([*(f"m{number}" for number in reversed(range(len(poses)))), "l/c"])
 

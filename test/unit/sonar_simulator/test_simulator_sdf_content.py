@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from programs import ROOT
 
 from sonar_simulator.world.world import MATERIALS
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 
 WORLDS = ROOT / "worlds"
 BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
@@ -46,7 +46,7 @@ def test_the_plane_of_a_collision_has_no_end_and_lies_across_its_normal(tmp_path
     geometry = f"<geometry><plane><normal>{' '.join(map(repr, normal))}</normal><size>5 5</size></plane></geometry>"
     path = tmp_path_factory.getbasetemp() / "plane.sdf"
     path.write_text(f'<sdf version="1.6"><world name="w">{_collision(geometry)}</world></sdf>')
-    (shape,) = load_sdf(path).world.shapes
+    (shape,) = load_world(path).shapes
     vertices, _ = shape.triangles()
     assert np.ptp(vertices, axis=0).max() > 2000.0
     np.testing.assert_allclose(vertices @ (normal / np.linalg.norm(normal)), 0.0, atol=1e-8)
@@ -55,7 +55,7 @@ def test_the_plane_of_a_collision_has_no_end_and_lies_across_its_normal(tmp_path
 
 def test_the_plane_of_a_visual_is_as_large_as_it_says(load):
     plane = "<geometry><plane><size>6 4</size></plane></geometry>"
-    (shape,) = load(_link(f'<visual name="v">{plane}</visual>')).world.shapes
+    (shape,) = load(_link(f'<visual name="v">{plane}</visual>')).shapes
     assert np.ptp(shape.triangles()[0], axis=0).tolist() == [6.0, 4.0, 0.0]
 
 
@@ -63,7 +63,7 @@ def test_ground_plane_is_known_without_gazebo_and_the_sun_is_no_surface(load):
     uris = "".join(f"<include><uri>model://{name}</uri></include>" for name in ("ground_plane", "sun"))
     loaded = load(uris.replace("</uri></include><include>", "</uri><pose>0 0 -5 0 0 0</pose></include><include>"))
     assert loaded.warnings == ()
-    (plane,) = loaded.world.shapes
+    (plane,) = loaded.shapes
     assert plane.kind == "plane"
     assert plane.pose[2, 3] == -5.0
 
@@ -71,7 +71,7 @@ def test_ground_plane_is_known_without_gazebo_and_the_sun_is_no_surface(load):
 def test_a_mesh_is_scaled_and_placed(load, tmp_path):
     (tmp_path / "t.obj").write_text(TETRAHEDRON)
     mesh = "<geometry><mesh><uri>t.obj</uri><scale>2 3 4</scale></mesh></geometry>"
-    (shape,) = load(_collision(mesh, "<pose>10 0 0 0 0 0</pose>")).world.shapes
+    (shape,) = load(_collision(mesh, "<pose>10 0 0 0 0 0</pose>")).shapes
     vertices, faces = shape.triangles()
     assert len(faces) == 4
     np.testing.assert_allclose(vertices.min(axis=0), (10, 0, 0))
@@ -83,7 +83,7 @@ def test_a_mesh_is_found_by_every_kind_of_uri(load, model_file, uri):
     folder = model_file("m", "")
     (folder / "t.obj").write_text(TETRAHEDRON)
     world = load(_collision(f"<geometry><mesh><uri>{uri.format(folder=folder)}</uri></mesh></geometry>"))
-    assert (world.warnings, len(world.world.faces)) == ((), 4)
+    assert (world.warnings, len(world.faces)) == ((), 4)
 
 
 def test_a_mesh_is_found_in_a_ros_package(load, tmp_path, monkeypatch):
@@ -97,7 +97,7 @@ def test_a_mesh_is_found_in_a_ros_package(load, tmp_path, monkeypatch):
     (package / "t.obj").write_text(TETRAHEDRON)
     monkeypatch.setenv("ROS_PACKAGE_PATH", str(package))
     loaded = load(_collision("<geometry><mesh><uri>package://boats/t.obj</uri></mesh></geometry>"))
-    assert (loaded.warnings, len(loaded.world.faces)) == ((), 4)
+    assert (loaded.warnings, len(loaded.faces)) == ((), 4)
 
 
 @pytest.mark.parametrize(
@@ -117,7 +117,7 @@ def test_a_mesh_that_cannot_be_given_is_one_line_with_file_and_element_and_the_r
     (tmp_path / "broken.stl").write_bytes(b"\x00" * 7)
     bad = f'<collision name="bad"><geometry><mesh>{mesh}</mesh></geometry></collision>'
     loaded = load(_link(f'{bad}<collision name="c">{BOX}</collision>'))
-    assert [shape.name for shape in loaded.world.shapes] == ["m/l/c"]
+    assert [shape.name for shape in loaded.shapes] == ["m/l/c"]
     (warning,) = loaded.warnings
     assert "some.sdf: m/l/bad: " in warning
     assert reason in warning
@@ -130,21 +130,21 @@ def test_an_included_model_stands_where_the_include_says(load, model_file):
         "<include><uri>model://post</uri><name>first</name><pose>1 0 0 0 0 0</pose></include>"
         "<include><uri>model://post</uri></include>"
     )
-    assert [shape.name for shape in loaded.world.shapes] == ["first/l/c", "model://post/l/c"]
-    assert [shape.pose[0, 3] for shape in loaded.world.shapes] == [1.0, 7.0]
+    assert [shape.name for shape in loaded.shapes] == ["first/l/c", "model://post/l/c"]
+    assert [shape.pose[0, 3] for shape in loaded.shapes] == [1.0, 7.0]
 
 
 def test_an_include_takes_the_newest_version_up_to_1_7(load, model_file):
     config = '<sdf version="1.4">old.sdf</sdf><sdf version="1.7">new.sdf</sdf><sdf version="1.9">future.sdf</sdf>'
     model_file("m", f'<model name="m">{LINK}</model>', config, "new.sdf")
-    assert len(load("<include><uri>model://m</uri></include>").world.shapes) == 1
+    assert len(load("<include><uri>model://m</uri></include>").shapes) == 1
 
 
 def test_a_model_may_include_models(load, model_file):
     model_file("inner", f'<model name="i">{LINK}</model>')
     include = "<include><uri>model://inner</uri><pose>0 2 0 0 0 0</pose></include>"
     model_file("outer", f'<model name="o">{include}</model>')
-    (shape,) = load("<include><uri>model://outer</uri><pose>1 0 0 0 0 0</pose></include>").world.shapes
+    (shape,) = load("<include><uri>model://outer</uri><pose>1 0 0 0 0 0</pose></include>").shapes
     assert shape.pose[:3, 3].tolist() == [1.0, 2.0, 0.0]
 
 
@@ -166,21 +166,21 @@ def test_a_material_holds_for_what_is_inside(load):
         f'<collision name="a">{BOX}</collision>'
         f'<collision name="b"><sonar:material>steel</sonar:material>{BOX}</collision></link></model>' + _collision(BOX)
     )
-    assert [shape.material.name for shape in loaded.world.shapes] == ["mud", "steel", "concrete"]
-    names = [loaded.world.materials[index].name for index in loaded.world.face_material[::12]]
+    assert [shape.material.name for shape in loaded.shapes] == ["mud", "steel", "concrete"]
+    names = [loaded.materials[index].name for index in loaded.face_material[::12]]
     assert names == ["mud", "steel", "concrete"]
 
 
 def test_a_material_of_ones_own_has_properties_as_attributes(load):
     own = '<sonar:material reflection="0.3" slope="0.02" lambert_db="-30" mirror="0.9">tiles</sonar:material>'
-    (shape,) = load(_collision(BOX, own)).world.shapes
+    (shape,) = load(_collision(BOX, own)).shapes
     found = [getattr(shape.material, name) for name in ("name", "reflection", "slope", "lambert_db", "mirror")]
     assert found == ["tiles", 0.3, 0.02, -30.0, 0.9]
 
 
 @pytest.mark.parametrize(("retro", "reflection"), [("0.25", 0.25), ("0", MATERIALS["concrete"].reflection)])
 def test_laser_retro_is_a_reflection(load, retro, reflection):
-    (shape,) = load(_collision(BOX, f"<laser_retro>{retro}</laser_retro>")).world.shapes
+    (shape,) = load(_collision(BOX, f"<laser_retro>{retro}</laser_retro>")).shapes
     assert shape.material.reflection == reflection
 
 
@@ -194,25 +194,25 @@ def test_laser_retro_is_a_reflection(load, retro, reflection):
 )
 def test_a_material_that_makes_no_sense_is_one_warning_and_the_shape_stays(load, material):
     loaded = load(_collision(BOX, material))
-    assert len(loaded.world.shapes) == len(loaded.warnings) == 1
+    assert len(loaded.shapes) == len(loaded.warnings) == 1
     assert "m/l/c" in loaded.warnings[0]
 
 
 def test_the_colour_of_a_link_is_its_visuals(load):
     visual = f'<visual name="v">{BOX}<material><diffuse>1 0.5 0 0.8</diffuse></material></visual>'
-    (shape,) = load(_link(f'{visual}<collision name="c">{BOX}</collision>')).world.shapes
+    (shape,) = load(_link(f'{visual}<collision name="c">{BOX}</collision>')).shapes
     assert shape.colour == (1.0, 0.5, 0.0, 0.8)
 
 
 @pytest.mark.parametrize(("name", "low", "high"), [("basin", 500, 20000), ("tank", 50, 100), ("harbour", 2300, 2700)])
 def test_a_shipped_world_loads_without_warnings(name, low, high):
-    loaded = load_sdf(WORLDS / f"{name}.sdf")
+    loaded = load_world(WORLDS / f"{name}.sdf")
     assert loaded.warnings == ()
-    assert low <= len(loaded.world.faces) <= high
+    assert low <= len(loaded.faces) <= high
 
 
 def test_the_harbours_bed_rises_out_of_the_water_in_the_east():
-    (bed,) = [shape for shape in load_sdf(WORLDS / "harbour.sdf").world.shapes if shape.kind == "mesh"]
+    (bed,) = [shape for shape in load_world(WORLDS / "harbour.sdf").shapes if shape.kind == "mesh"]
     vertices, _ = bed.triangles()
     assert vertices[vertices[:, 0] < 5.0, 2].max() < -5.5
     assert vertices[vertices[:, 0] > 31.0, 2].min() > 0.0

@@ -15,12 +15,12 @@ from sonar_simulator.echoes.echo_model import make_echo_model
 from sonar_simulator.echoes.ray_caster import RayCaster
 from sonar_simulator.simulation.sonar_head import Sonar, SonarHead, SonarParameters, WorldEchoes, world_echoes
 from sonar_simulator.world.world import Shape, World
-from sonar_simulator.world.world_file import load_sdf
+from sonar_simulator.world.world_file import load_world
 
 PATTERN = BeamPattern(math.radians(22.0), math.radians(2.5), 50, 10)
 HEAD = SonarHead(120, 16.0)
 BASIN_FILE = ROOT / "worlds" / "basin.sdf"
-BASIN = load_sdf(BASIN_FILE).world
+BASIN = load_world(BASIN_FILE)
 WALLS = World.from_shapes("walls", [shape for shape in BASIN.shapes if "wall" in shape.name])
 
 
