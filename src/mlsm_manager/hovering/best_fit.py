@@ -5,7 +5,7 @@ moves each scan to the nearest place where it fits, and a search that goes forwa
 all. Here a whole path is known, and each step weighs the whole run (basin hopping, Wales and Doye 1997).
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import Callable, Iterator, List, Sequence, Tuple
 
 import numpy as np
@@ -49,18 +49,13 @@ class JudgedPath:
     log_likelihood: float
 
 
-@dataclass(frozen=True)
 class ShiftSearch:
-    """echoes: of all scans, the nodes of which count from 0. times: (k,) s of the nodes. parts: scans per turn."""
+    """Shifts parts of paths to where the scans fit better."""
 
-    echoes: Echoes
-    times: np.ndarray
-    parts: int
-    refit: Refit
-    _missed: MissedPosts = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "_missed", MissedPosts(self.echoes, self.parts))
+    def __init__(self, echoes: Echoes, times: np.ndarray, parts: int, refit: Refit) -> None:
+        """echoes: of all scans, the nodes of which count from 0. times: (k,) s of the nodes. parts: scans per turn."""
+        self.echoes, self.times, self.parts, self.refit = echoes, times, parts, refit
+        self._missed = MissedPosts(echoes, parts)
 
     def judged(self, path: np.ndarray) -> JudgedPath:
         """Return a path (k, 2) with its log likelihood: of the echoes that agree, less what is missed."""
@@ -72,7 +67,7 @@ class ShiftSearch:
         tried: List[JudgedPath] = []
         idle = 0
         for _ in range(_ROUNDS):
-            new = [one for one in found if not any(_alike(one, old) and _hardly_better(one, old) for old in tried)]
+            new = [one for one in found if not any(_is_tried(one, old) for old in tried)]
             tried += new
             better = _distinct(found + [other for one in new for other in self._neighbours(one)])
             idle = 0 if better[0].log_likelihood > found[0].log_likelihood + _GAIN else idle + 1
@@ -155,8 +150,8 @@ def _alike(one: JudgedPath, other: JudgedPath) -> bool:
     return float(np.hypot(*(one.path - other.path).T).mean()) < _OTHER
 
 
-def _hardly_better(one: JudgedPath, known: JudgedPath) -> bool:
-    return one.log_likelihood < known.log_likelihood + _GAIN
+def _is_tried(one: JudgedPath, before: JudgedPath) -> bool:
+    return _alike(one, before) and one.log_likelihood < before.log_likelihood + _GAIN
 
 
 def stretched_mean(search: ShiftSearch, path: np.ndarray) -> JudgedPath:

@@ -11,6 +11,13 @@ from numba import boolean, float64, int64, types
 
 from node_support.numba_cache import compiled
 
+ACROSS = 0.7  # m: standard deviation of an echo across the surface of another
+ALONG = 1.5  # m: and along it, where it says less
+AROUND = 1.0  # m: of a post
+FARTHEST = 12.0  # squared deviations; echoes farther apart say nothing of each other
+FADING = 0.25  # of squared deviations: half of what weights fade by, so that echoes pull from farther off
+_ACROSS, _ALONG, _AROUND = (np.array([ACROSS, ALONG, AROUND]) ** -2.0).tolist()
+_STIFFNESS = 0.7**-2.0  # 1/m^2, holds a particle's newest place before its echoes tell more
 _LANES = 64  # particles that are compared at once: fewer use registers worse, more have fewer targets out of reach
 _NEVER = 1e300  # squared deviations: no echo lies so far away
 ARM_X, ARM_Y, SHARE, WEIGHT, ACROSS_X, ACROSS_Y, ALONG_X, ALONG_Y = range(8)
@@ -51,23 +58,8 @@ class Echoes(NamedTuple):
         return self.arms + (1.0 - share) * paths[..., before, :] + share * paths[..., before + 1, :]
 
 
-class Pull(NamedTuple):
-    """How much echoes pull: 1/m^2 across and along a surface and around a post, and `fading` with squared deviations.
-
-    farthest: squared deviations beyond which none pulls. stiffness: 1/m^2 that holds the end of each path.
-    """
-
-    across: float
-    along: float
-    around: float
-    farthest: float
-    fading: float
-    stiffness: float
-
-
 _ROWS, _VALUES, _TABLE = int64[::1], float64[::1], float64[:, ::1]
 _POINTS = types.NamedTuple((_ROWS, _TABLE, _VALUES, _TABLE, _VALUES, boolean[::1]), Echoes)
-_PULL = types.NamedUniTuple(float64, 6, Pull)
 
 
 @compiled(fastmath=True)
@@ -100,14 +92,14 @@ def _write_reach(point, before, after, reach):
 
 
 @compiled()
-def _is_near(own, other, target, farthest):
+def _is_near(own, other, target):
     """Return whether a source may lie on a target on some particles; own, other: their reaches."""
     x, y, wide_x, wide_y = other[0] - own[0], other[1] - own[1], other[2] + own[2], other[3] + own[3]
     across = abs(x * target[ACROSS_X] + y * target[ACROSS_Y])
     across -= wide_x * abs(target[ACROSS_X]) + wide_y * abs(target[ACROSS_Y])
     along = abs(x * target[ALONG_X] + y * target[ALONG_Y])
     along -= wide_x * abs(target[ALONG_X]) + wide_y * abs(target[ALONG_Y])
-    return max(across, 0.0) ** 2 + max(along, 0.0) ** 2 < farthest
+    return max(across, 0.0) ** 2 + max(along, 0.0) ** 2 < FARTHEST
 
 
 @compiled()
@@ -139,15 +131,15 @@ def _lower(least, places, deviations, target):
         least[lane] = min(least[lane], across * across + along * along)
 
 
-@compiled(_VALUES(float64[:, :, ::1], _ROWS, _ROWS, _TABLE, _ROWS, _TABLE, float64), error_model="numpy")
-def log_likelihoods(paths, starts, candidates, sources, target_nodes, targets, farthest):
+@compiled(_VALUES(float64[:, :, ::1], _ROWS, _ROWS, _TABLE, _ROWS, _TABLE), error_model="numpy")
+def log_likelihoods(paths, starts, candidates, sources, target_nodes, targets):
     """Return how much (n,) sources speak for n particles: a weight for each nearest target, fading with its distance.
 
     Some particles are taken at a time, so that one instruction compares several; targets that none of them can reach
     are dropped first.
 
     paths: (n, k, 2) m. starts, candidates: rows of the sources that may lie on each target. sources (s, 8), targets
-    (t, 8): points; sources were heard between the last two nodes. farthest: squared deviations.
+    (t, 8): points; sources were heard between the last two nodes.
     """
     result, last = np.zeros(len(paths)), paths.shape[1] - 2
     nodes, ranges = np.empty((paths.shape[1], 2, _LANES)), np.empty((paths.shape[1], 4))
@@ -167,7 +159,7 @@ def log_likelihoods(paths, starts, candidates, sources, target_nodes, targets, f
             is_placed = False
             for index in range(starts[row], starts[row + 1]):
                 source = candidates[index]
-                if not _is_near(reaches[source], reach, target, farthest):
+                if not _is_near(reaches[source], reach, target):
                     continue
                 if not is_placed:
                     _write_places(target, nodes[node], nodes[node + 1], target_places)
@@ -176,7 +168,7 @@ def log_likelihoods(paths, starts, candidates, sources, target_nodes, targets, f
                 _lower(least[source], places[source], deviations, target)
         for source in range(len(sources)):
             for lane in range(count):
-                if least[source, lane] < farthest:
+                if least[source, lane] < FARTHEST:
                     result[first + lane] += sources[source, WEIGHT] * np.exp(-0.5 * least[source, lane])
     return result
 
@@ -189,7 +181,7 @@ def _place(arm, share, path, node):
 
 
 @compiled()
-def _nearest(x, y, rows, places, normals, is_post, pull):
+def _nearest(x, y, rows, places, normals, is_post):
     """Return which of the targets in `rows` is nearest to x, y, and how far off in squared deviations."""
     best, least = -1, np.inf
     for row in rows:
@@ -197,9 +189,9 @@ def _nearest(x, y, rows, places, normals, is_post, pull):
         across = offset_x * normals[row, 0] + offset_y * normals[row, 1]
         along = offset_y * normals[row, 0] - offset_x * normals[row, 1]
         if is_post:
-            squared = (offset_x * offset_x + offset_y * offset_y) * pull.around
+            squared = (offset_x * offset_x + offset_y * offset_y) * _AROUND
         else:
-            squared = across * across * pull.across + along * along * pull.along
+            squared = across * across * _ACROSS + along * along * _ALONG
         if squared < least:
             best, least = row, squared
     return best, least
@@ -219,8 +211,8 @@ def _add(sums, offset_x, offset_y, normal, is_post, weight, share):
     sums[4] += share * (xy * offset_x + yy * offset_y)
 
 
-@compiled(_TABLE(float64[:, :, ::1], _ROWS, _ROWS, _POINTS, _POINTS, _PULL), error_model="numpy")
-def moves_onto_echoes(paths, starts, candidates, sources, targets, pull):
+@compiled(_TABLE(float64[:, :, ::1], _ROWS, _ROWS, _POINTS, _POINTS), error_model="numpy")
+def moves_onto_echoes(paths, starts, candidates, sources, targets):
     """Return moves (n, 2) [m] of the ends of n particles, to where the sources lie better on their nearest targets.
 
     paths: (n, k, 2) m. starts, candidates: rows of targets that each source may lie on. sources: heard between the
@@ -228,17 +220,17 @@ def moves_onto_echoes(paths, starts, candidates, sources, targets, pull):
     """
     moves, last, places = np.empty((len(paths), 2)), paths.shape[1] - 2, np.empty((len(targets.nodes), 2))
     for particle in range(len(paths)):
-        sums = np.array([pull.stiffness, 0.0, pull.stiffness, 0.0, 0.0])
+        sums = np.array([_STIFFNESS, 0.0, _STIFFNESS, 0.0, 0.0])
         for row in range(len(places)):
             places[row] = _place(targets.arms[row], targets.shares[row], paths[particle], targets.nodes[row])
         for source in range(len(sources.nodes)):
             share, is_post = sources.shares[source], sources.post[source]
             x, y = _place(sources.arms[source], share, paths[particle], last)
             rows = candidates[starts[source] : starts[source + 1]]
-            best, squared = _nearest(x, y, rows, places, targets.normals, is_post, pull)
-            if squared < pull.farthest:
-                weight = sources.weights[source] * np.exp(-pull.fading * squared)
-                weight *= pull.around if is_post else pull.across
+            best, squared = _nearest(x, y, rows, places, targets.normals, is_post)
+            if squared < FARTHEST:
+                weight = sources.weights[source] * np.exp(-FADING * squared)
+                weight *= _AROUND if is_post else _ACROSS
                 _add(sums, places[best, 0] - x, places[best, 1] - y, targets.normals[best], is_post, weight, share)
         determinant = sums[0] * sums[2] - sums[1] ** 2
         moves[particle, 0] = (sums[2] * sums[3] - sums[1] * sums[4]) / determinant

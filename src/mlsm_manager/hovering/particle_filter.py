@@ -11,8 +11,8 @@ from typing import Dict, List, Mapping, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from mlsm_manager.hovering.compiled_particles import Echoes, Pull, log_likelihoods, moves_onto_echoes
-from mlsm_manager.hovering.particles import ACROSS, ALONG, AROUND, FACING, FARTHEST, Particles, drawn, echoes_of, led
+from mlsm_manager.hovering.compiled_particles import ACROSS, ALONG, AROUND, Echoes, log_likelihoods, moves_onto_echoes
+from mlsm_manager.hovering.particles import FACING, Particles, drawn, echoes_of, led
 from mlsm_manager.joint_solver.normal_equations import YAW
 from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.parameters import SolverParameters
@@ -25,13 +25,10 @@ _COUNT = 6000  # particles: with 1000 one simulated tour of two is lost
 _START_SPEED = 0.3  # m/s: the usual speed of a small vehicle
 _REMEMBERED_TURNS = 40  # about ten minutes, as long as the newest nodes of the solver stay free
 _ASTRAY = 1.0  # m, mean distance of the free nodes from the particles: farther off, they are at a wrong place
-_STORED_NAMES = {"paths": "ways.paths", "speeds": "ways.speeds", "log_weights": "ways.nats"}
-"""What files of maps call the fields of Particles."""
+_STORED_NAMES = {"paths": "ways.paths", "speeds": "ways.speeds", "log_weights": "ways.nats"}  # in files of maps
 _CELL = 6.0  # m: side of the squares within which particles end near each other, less than echoes may be apart
 _GATE = 8.0  # m that two echoes may be apart on the mean path, besides twice the particles' spread
 _PULLED = 0.5  # share of the particles that are moved; the others stay where the motion leads them
-_FREEDOM = 0.7  # m: deviation of a particle's newest place before its echoes tell more
-FADING = 0.25  # of squared deviations: half of what weights fade by, so that echoes pull from farther off
 
 
 @dataclass(frozen=True)
@@ -103,7 +100,9 @@ class ParticleFilter:
         before = self.particles or Particles.begun(_COUNT, motion.poses[0, :2], _START_SPEED, rng)
         sources = echoes_of(log, parameters, scan)
         longest = self.remembered_turns * parameters.parts_per_turn + 1
-        targets = self._targets(scan - (before.paths.shape[1] - 1))
+        targets = Echoes.joined(self.echoes) if self.echoes else None
+        if targets is not None:
+            targets = targets._replace(nodes=targets.nodes - (scan - (before.paths.shape[1] - 1)))
         draw = drawn(before, duration, turn, rng)
         draw = draw if targets is None else led(before, draw, sources, targets, duration, rng)
         particles = before.continued(*draw, longest=longest + 1)
@@ -111,13 +110,6 @@ class ParticleFilter:
             particles = weighed(particles, sources, targets, duration, rng).resampled(rng)
         particles = particles._replace(paths=particles.paths[:, -longest:])
         return replace(self, scans=scan + 1, echoes=(*self.echoes, sources)[-(longest - 1) :], particles=particles)
-
-    def _targets(self, first: int) -> Optional[Echoes]:
-        """Return all echoes, with nodes that count from `first`; None where there are none."""
-        if not self.echoes:
-            return None
-        joined = Echoes.joined(self.echoes)
-        return joined._replace(nodes=joined.nodes - first)
 
 
 def on_path(nodes: np.ndarray, path: np.ndarray, motion: Motion) -> np.ndarray:
@@ -189,10 +181,8 @@ def likelihoods_of(particles: Particles, sources: Echoes, nearby: Nearby) -> np.
     """Return the log likelihoods (n,) of the sources on n particles, each by what it may lie on."""
     order = np.argsort(nearby.rows, kind="stable")
     starts = np.searchsorted(nearby.rows[order], np.arange(nearby.targets.size + 1))
-    return log_likelihoods(
-        np.ascontiguousarray(particles.paths), starts, nearby.sources[order], _columns(sources),
-        nearby.targets.nodes, _columns(nearby.targets), FARTHEST,
-    )  # fmt: skip
+    paths, targets = np.ascontiguousarray(particles.paths), nearby.targets
+    return log_likelihoods(paths, starts, nearby.sources[order], _columns(sources), targets.nodes, _columns(targets))
 
 
 def _columns(echoes: Echoes) -> np.ndarray:
@@ -226,5 +216,4 @@ def pulls_of(particles: Particles, sources: Echoes, nearby: Nearby) -> np.ndarra
     Surfaces pull across themselves only.
     """
     starts = np.searchsorted(nearby.sources, np.arange(sources.size + 1))
-    pull = Pull(*np.array([ACROSS, ALONG, AROUND]) ** -2.0, FARTHEST, FADING, _FREEDOM**-2.0)
-    return moves_onto_echoes(np.ascontiguousarray(particles.paths), starts, nearby.rows, sources, nearby.targets, pull)
+    return moves_onto_echoes(np.ascontiguousarray(particles.paths), starts, nearby.rows, sources, nearby.targets)

@@ -5,8 +5,8 @@ from typing import NamedTuple, Union
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mlsm_manager.hovering.compiled_particles import Echoes
-from mlsm_manager.hovering.particles import ACROSS, ALONG, AROUND, FACING, FARTHEST
+from mlsm_manager.hovering.compiled_particles import ACROSS, ALONG, AROUND, FARTHEST, Echoes
+from mlsm_manager.hovering.particles import FACING
 
 _FARTHEST_ALONG = ALONG * FARTHEST**0.5  # m: echoes farther apart tell nothing of each other
 _SAME = 3.0  # m: an echo so near a place was heard of what stands there, or of what stands beside it

@@ -1,6 +1,6 @@
 """Where a recorded odometry was wrong, which is mended: held and repeated poses, steps, poses that tremble."""
 
-from typing import Iterator, List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Tuple
 
 import numpy as np
 
@@ -41,14 +41,9 @@ def mended(track: Track, limits: MotionLimits) -> Mended:
     odometry = ContinuousOdometry(limits)
     odometry.take(track)
     steps = sorted([*repeats, *trembling, *compass, *odometry.steps], key=lambda step: step.time)
-    return Mended(odometry.followed(track), steps, stuck, list(_untold(track, steps)))
-
-
-def _untold(track: Track, steps: Sequence[Step]) -> Iterator[Tuple[float, float]]:
-    """Yield beginnings and ends [s] of long steps within which a vehicle that turns as usual may have any heading."""
-    for step in steps:
-        if step.is_too_long and _bridged_apart(track, step.time - step.begin) > _ANY_HEADING:
-            yield step.begin, step.time
+    long = [(step.begin, step.time) for step in steps if step.is_too_long]
+    untold = [(begin, end) for begin, end in long if _bridged_apart(track, end - begin) > _ANY_HEADING]
+    return Mended(odometry.followed(track), steps, stuck, untold)
 
 
 def _bridged_apart(track: Track, seconds: float) -> float:

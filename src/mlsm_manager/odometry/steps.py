@@ -135,9 +135,7 @@ _AS_BEFORE = 0.5  # share of that speed that the last step before a stall has, a
 
 class Stall(NamedTuple):
     """begin, end: of the poses, the first that stood and the first after it. missed, usual: (3,) in base_link, how the
-    vehicle went meanwhile, and in a step as long as the last one, if it went on as before. kind: STALLED where the
-    heading stood too, else POSITIONS; HELD or HUNG where it jumped afterwards. lost: s, in which nothing tells how the
-    vehicle went.
+    vehicle went meanwhile, and in a step as long as the last one, if it went on as before. lost: s, as of a Step.
     """
 
     begin: int
@@ -223,7 +221,9 @@ def _stall(track: Track, first: int, last: int) -> Optional[Stall]:
         goes = stops[0] or _speeds(again)[0] > _GOES[0]
     else:
         missed = usual * seconds
-        at_once, trembles = (stops & _goes_on_at_once(track, last, usual)).any(), _trembles(rates[:, 2])
+        at_once, turns = (stops & _goes_on_at_once(track, last, usual)).any(), rates[:, 2]
+        # A heading that is measured turns to and fro and never stands.
+        trembles = (turns != 0.0).all() and np.count_nonzero(np.diff(np.sign(turns))) >= _TO_AND_FRO
         goes = at_once or trembles if times[last] - times[first] < _STANDS_FOR else at_once and trembles
     return Stall(first, last + 1, missed, usual * step, kind, seconds) if goes else None
 
@@ -278,11 +278,6 @@ def seconds_untold(
     is_held = (before >= 0) & (moves[:, :2] == 0.0).all(axis=1) & (moves[:, 2] != 0.0)
     steps = np.diff(all_times, prepend=all_times[0])[count:]
     return np.where(is_held, steps, lost)
-
-
-def _trembles(turns: np.ndarray) -> bool:
-    """Return whether a heading is one that is measured: such a one turns to and fro and never stands."""
-    return bool((turns != 0.0).all() and np.count_nonzero(np.diff(np.sign(turns))) >= _TO_AND_FRO)
 
 
 def _speeds(rates: np.ndarray) -> np.ndarray:

@@ -59,9 +59,7 @@ class FixPublisher:
         twist.linear.x, twist.linear.y, twist.angular.z = result.velocity
         odometry.twist.covariance = pose_covariance(result.covariance[3:, 3:])
         self._odometry.publish(odometry)
-        self._extend(PoseStamped(header=fix.header, pose=fix.pose.pose))
-
-    def _extend(self, pose: PoseStamped) -> None:
+        pose = PoseStamped(header=fix.header, pose=fix.pose.pose)
         self._matched_path.header = pose.header
         self._matched_path.poses = [*self._matched_path.poses[-_LONGEST_PATH:], pose]
         self._path.publish(self._matched_path)

@@ -17,7 +17,7 @@ from mlsm_manager.localisation.parameters import MlsmCoreParameters
 from mlsm_manager.ros.markers import BlockMarkers
 from mlsm_manager.surface_map.blocks import Blocks, BlockType
 from mlsm_manager.surface_map.export.formats import octree
-from mlsm_manager.surface_map.export.rasters import Raster, occupancy
+from mlsm_manager.surface_map.export.rasters import occupancy
 from mlsm_manager.surface_map.map_file import ExportError
 from node_support import topics
 from node_support.errors import RefusedInput
@@ -39,18 +39,6 @@ def map_cloud(blocks: Blocks, free: Optional[Blocks], stamp_ns: int, frame_id: s
 
 def _cloud_rows(blocks: Blocks, kinds: np.ndarray) -> np.ndarray:
     return np.column_stack([blocks.mean, blocks.height, blocks.depth, blocks.count, kinds])
-
-
-def occupancy_grid(grid: Raster, stamp_ns: int, frame_id: str) -> OccupancyGrid:
-    """Return a raster of `occupancy` as a message: -1 unknown, 0 free, 100 occupied."""
-    message = OccupancyGrid(header=header(stamp_ns, frame_id))
-    message.info.map_load_time = message.header.stamp
-    message.info.resolution = grid.resolution
-    message.info.height, message.info.width = grid.values.shape
-    message.info.origin.position.x, message.info.origin.position.y = grid.origin
-    message.info.origin.orientation.w = 1.0
-    message.data = grid.values.ravel().tolist()
-    return message
 
 
 def has_octomap_messages() -> bool:
@@ -189,10 +177,17 @@ class MapPublisher:
         return map_cloud(self._localiser.blocks, free, stamp_ns, self._parameters.map_frame)
 
     def grid(self) -> OccupancyGrid:
-        """Return the map from above: free, unknown and occupied."""
-        parameters, stamp_ns = self._parameters, self._stamp_ns
+        """Return the map from above: -1 unknown, 0 free, 100 occupied."""
+        parameters = self._parameters
+        message = OccupancyGrid(header=header(self._stamp_ns, parameters.map_frame))
         grid = occupancy(self._localiser.blocks, self._localiser.free, parameters.grid_low, parameters.grid_high)
-        return occupancy_grid(grid, stamp_ns, parameters.map_frame)
+        message.info.map_load_time = message.header.stamp
+        message.info.resolution = grid.resolution
+        message.info.height, message.info.width = grid.values.shape
+        message.info.origin.position.x, message.info.origin.position.y = grid.origin
+        message.info.origin.orientation.w = 1.0
+        message.data = grid.values.ravel().tolist()
+        return message
 
     def _octomap(self) -> Any:
         stamp_ns = self._stamp_ns

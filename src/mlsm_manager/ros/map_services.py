@@ -157,11 +157,10 @@ class MapServices:
         self._on_fix(update)
         x, y, yaw = update.result.pose
         found = f"at x {x:.2f} m, y {y:.2f} m, yaw {np.degrees(wrapped(yaw)):.1f} deg in map"
-        return TriggerResponse(True, found + _left_out(update.forgotten))
-
-
-def _left_out(turns: int) -> str:
-    return f"; the {turns} turns of the head since the silence, which lay apart, are left out of it" if turns else ""
+        if update.forgotten:
+            apart = f"the {update.forgotten} turns of the head since the silence, which lay apart"
+            found += f"; {apart}, are left out of it"
+        return TriggerResponse(True, found)
 
 
 class Autosave:

@@ -61,7 +61,7 @@ class MlsmCore:
         self._odometry = OdometryTrack(
             parameters.odom_frame, parameters.base_frame, self.health, parameters.stamp_tolerance
         )
-        self._localiser.following.odometry.stood = self._odometry.stood
+        self._localiser.following.odometry.stood = self._odometry.tf.clock.stood
         self._mounted = False
         self._steps_told = 0
         self._z_down = ZDownSigns()
@@ -177,7 +177,7 @@ class MlsmCore:
             self._mounted = True
 
     def _check_header(self, cloud: Cloud) -> None:
-        self._odometry.check_stamp(cloud.stamp_ns)
+        self._odometry.tf.check_stamp(cloud.stamp_ns)
         allowed = self._live.current.odom_frame, self._live.current.map_frame
         if cloud.frame_id not in allowed:
             must = f"frame {cloud.frame_id!r}, must be {allowed[0]!r} or {allowed[1]!r}"
@@ -267,16 +267,14 @@ class MlsmCore:
     def _notice_time(self, time: float, odometry: Optional[np.ndarray] = None) -> None:
         seconds = self._localiser.notice_time(time, odometry)
         if seconds:
-            self._odometry.clear()
+            self._odometry.tf.clear()
             self._z_down, self.status.verdicts = ZDownSigns(), ()
-            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, {self._place_after_jump()}")
-
-    def _place_after_jump(self) -> str:
-        if self._localiser.is_lost:
-            return "the whole map is searched for the vehicle; call ~reset_map where another recording began"
-        if self._localiser.is_expected:
-            return "the vehicle is expected where it was"
-        return "the position in it starts at odom's again"
+            place = "the position in it starts at odom's again"
+            if self._localiser.is_lost:
+                place = "the whole map is searched for the vehicle; call ~reset_map where another recording began"
+            elif self._localiser.is_expected:
+                place = "the vehicle is expected where it was"
+            self.health.problem("jumps in time", f"by {-seconds:.1f} s; the map stays, {place}")
 
     def _after_replacing(self) -> None:
         self.status.verdicts = ()

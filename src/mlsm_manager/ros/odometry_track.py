@@ -1,6 +1,6 @@
 """The vehicle's way by odometry, from tf."""
 
-from typing import Optional, Sequence, Tuple
+from typing import Optional, Tuple
 
 import numpy as np
 
@@ -16,29 +16,16 @@ _STEADY = 65  # times of a track besides those of the beams: four a second in a 
 
 
 class OdometryTrack:
-    """Looks up odom -> base_link at many times."""
+    """Looks up odom -> base_link at many times; `tf`: where. name: as which its silence is told."""
 
     def __init__(self, odom_frame: str, base_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frames = odom_frame, base_frame
         self.name = f"tf of {odom_frame} -> {base_frame}"
-        """As which its silence is told."""
         self._health = health
         self._newest_ns: Optional[int] = None
         health.expect(self.name)
-        self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, parent=odom_frame)
-
-    def check_stamp(self, stamp_ns: int) -> None:
-        """Raise RefusedInput for a stamp [ns] that is not near the newest odometry or the clock."""
-        self._transforms.check_stamp(stamp_ns)
-
-    @property
-    def stood(self) -> Sequence[Tuple[float, float]]:
-        """From when to when [s] stamps went on after a clock had stood."""
-        return self._transforms.clock.stood
-
-    def clear(self) -> None:
-        self._transforms.clear()
+        self.tf = TfBuffer(health, _CACHE, stamp_tolerance, parent=odom_frame)
 
     def track(self, start: float, times: np.ndarray, end: float, lookahead: float = 0.0) -> Track:
         """Return the track from `start` to `end` and, where it is known, `lookahead` beyond [s], exact at `times` (n,).
@@ -46,26 +33,31 @@ class OdometryTrack:
         What tf no longer knows of the past is left out. Raises RefusedInput when tf does not learn the vehicle's place
         at `end` within a second.
         """
-        self._transforms.wait_for(*self._frames, stamp_of(end + lookahead), _PATIENCE + lookahead)
-        obstacle = self._transforms.wait_for(*self._frames, stamp_of(end), 0.0)
+        self.tf.wait_for(*self._frames, stamp_of(end + lookahead), _PATIENCE + lookahead)
+        obstacle = self.tf.wait_for(*self._frames, stamp_of(end), 0.0)
         if obstacle:
             raise self._without_odometry(obstacle)
         steady = np.append(np.linspace(start, end, _STEADY), end + lookahead)
         wanted = np.unique(np.concatenate([steady, times[(times >= start) & (times <= end)]]))
-        found = [(time, self._pose(time)) for time in wanted]
-        known = [(time, pose) for time, pose in found if pose is not None]
+        known, poses = [], []
+        for time in wanted:
+            try:
+                poses.append(planar(self.matrix(time)))
+            except RefusedInput:
+                continue
+            known.append(time)
         if not known:
             raise self._without_odometry(f"nothing from {start:.3f} to {end:.3f} s")
-        return Track(np.array([time for time, _ in known]), np.array([pose for _, pose in known]))
+        return Track(np.array(known), np.array(poses))
 
     def matrix(self, time: float) -> np.ndarray:
         """Return the (4, 4) T_odom_base at `time` [s], which a track has been made of."""
-        return self._transforms.matrix(*self._frames, stamp_of(time))
+        return self.tf.matrix(*self._frames, stamp_of(time))
 
     def place_on_vehicle(self, frame: str, time: float) -> Optional[np.ndarray]:
         """Return (2,) x y [m] of `frame` in base_link at `time` [s]; None where tf does not know it."""
         try:
-            return self._transforms.matrix(self._frames[1], frame, stamp_of(time))[:2, 3]
+            return self.tf.matrix(self._frames[1], frame, stamp_of(time))[:2, 3]
         except RefusedInput:
             return None
 
@@ -74,7 +66,7 @@ class OdometryTrack:
 
         Static transforms hold at all times and have none of their own: the time is then None.
         """
-        found = self._transforms.newest(*self._frames)
+        found = self.tf.newest(*self._frames)
         if found is None:
             return None
         stamp_ns, matrix = found
@@ -82,12 +74,6 @@ class OdometryTrack:
             self._newest_ns = stamp_ns
             self._health.heard(self.name)
         return (stamp_ns * 1e-9 if stamp_ns else None), matrix
-
-    def _pose(self, time: float) -> Optional[np.ndarray]:
-        try:
-            return planar(self.matrix(time))
-        except RefusedInput:
-            return None
 
     def _without_odometry(self, reason: str) -> RefusedInput:
         return RefusedInput("scans without odometry", f"from {self._frames[1]} to {self._frames[0]}: {reason}")

@@ -1,6 +1,7 @@
 """Tells the position as it is known now: in words, as a pose with its covariance, and in rviz at the vehicle."""
 
 import time
+from textwrap import fill
 from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
@@ -40,8 +41,7 @@ _MOST = 2.5  # m, of a letter: larger ones hide the map
 _LINE, _THIN = 0.08, 0.03  # letters: width of a line, and of one of the grid
 _VEHICLE, _ABOVE = 2.0, 1.5  # letters: length of the vehicle's arrow, height over it
 _ASIDE = (-6.0, -7.0)  # letters from the vehicle, where scale bar and north arrow begin
-# Letters from the vehicle: where lines of the grid end, and where they are labelled.
-_GRID, _LABELS = 30.0, (18.0, 12.0)
+_GRID, _LABELS = 30.0, (18.0, 12.0)  # letters from the vehicle: where lines of the grid end and are labelled
 _BARS = (0.1, 1.0, 10.0)  # m: the longest one that eight letters hold is drawn
 _WITHIN = float(np.sqrt(-2.0 * np.log(0.05)))  # deviations of a plane's ellipse that holds 95 %
 _ROUND = np.linspace(0.0, 2.0 * np.pi, 49)
@@ -51,7 +51,8 @@ _WIDEST = 52  # letters of a line of the status
 class StatusTeller:
     """Tells each second how old and how good the position is: on /diagnostics, /MLSM/status and /MLSM/pose_now.
 
-    It does so by the wall clock, and goes on while no scan, no odometry and no other clock come.
+    It does so by the wall clock, and goes on while no scan, no odometry and no other clock come. verdicts: what the run
+    says of itself. stages_before: of the same process, whose inputs must come too.
     """
 
     def __init__(
@@ -59,10 +60,8 @@ class StatusTeller:
         map_frame: str, health: Health,
     ) -> None:  # fmt: skip
         self.verdicts: Sequence[Verdict] = ()
-        """What the run says of itself."""
         self.is_provisional = False
         self.stages_before: Sequence[Health] = ()
-        """Of the same process, whose inputs must come too."""
         self._localiser, self._odometry, self._transform = localiser, odometry, transform
         self._chart = chart
         self._health, self._map_frame = health, map_frame
@@ -169,9 +168,10 @@ def _status(made: "_Maker", status: PositionStatus, ahead: np.ndarray, length: f
     color, letter = _COLORS[PositionState(status.state)], made.letter
     half, origin = np.multiply(ahead, _VEHICLE * letter / 2.0), np.multiply(_ASIDE, letter)
     bar, north = (np.array([origin, np.add(origin, way)]) for way in ((length, 0.0), (0.0, 2.5 * letter)))
+    text = fill(status.text, _WIDEST, break_long_words=False, break_on_hyphens=False)
     fix = f"\nfix {status.age:.0f} s ago" if np.isfinite(status.age) else ""
     markers = [
-        made.text(wrapped_text(status.text) + fix, np.array([0.0, 2.5 * letter]), color),
+        made.text(text + fix, np.array([0.0, 2.5 * letter]), color),
         made.arrow(np.array([-half, half]), color),
         made.line(bar, _WHITE),
         made.text(f"{length:g} m", np.add(bar[1], (1.2 * letter, 0.0)), _WHITE),
@@ -187,14 +187,6 @@ def ellipse(covariance: np.ndarray) -> np.ndarray:
     values, vectors = np.linalg.eigh(covariance)
     axes = _WITHIN * np.sqrt(np.maximum(values, 0.0))
     return (np.column_stack([np.cos(_ROUND), np.sin(_ROUND)]) * axes) @ vectors.T
-
-
-def wrapped_text(text: str) -> str:
-    """Return a text in lines that fit beside a vehicle."""
-    lines = [""]
-    for word in text.split():
-        lines = [*lines[:-1], f"{lines[-1]} {word}".strip()] if len(lines[-1]) + len(word) < _WIDEST else [*lines, word]
-    return "\n".join(lines)
 
 
 class _Maker:

@@ -29,7 +29,7 @@ _SIDE = 100  # pixels of the thinned image
 _TELL = 60.0  # s between two lines of the log
 
 
-class ThinLink:
+class ThinLink(rospy.SubscribeListener):
     """Sends fixes at once, then what changed of the map, then all else, each as the newest there is."""
 
     def __init__(self) -> None:
@@ -44,7 +44,7 @@ class ThinLink:
         self._bytes: Counter = Counter()
         self._publishers: Dict[str, rospy.Publisher] = {}
         self._pass_on(topics.MATCHED_POSE, PoseWithCovarianceStamped, self._take_pose)
-        self._pass_on(topics.MAP_MARKERS, MarkerArray, self._take_map, _Latecomers(self._again))
+        self._pass_on(topics.MAP_MARKERS, MarkerArray, self._take_map, self)
         self._pass_on(_DIAGNOSTICS, DiagnosticArray, self._seldom(_DIAGNOSTICS, lambda message: message))
         self._pass_on(topics.MATCHED_PATH, Path, self._seldom(topics.MATCHED_PATH, thinned_path))
         self._pass_on(topics.IMAGE, Image, self._seldom(topics.IMAGE, thinned_image))
@@ -66,18 +66,15 @@ class ThinLink:
     def _take_map(self, message: MarkerArray) -> None:
         with self._lock:
             for marker in message.markers:
-                self._take_marker(marker)
-
-    def _take_marker(self, marker: Marker) -> None:
-        key = (marker.ns, marker.id)
-        if marker.action == Marker.DELETEALL:
-            self._queue.drop(list(self._known))
-            self._known.clear()
-        elif marker.action == Marker.DELETE:
-            self._known.pop(key, None)
-        else:
-            self._known[key] = marker
-        self._put(topics.MAP_MARKERS, key, marker, 1 if marker.action == Marker.DELETEALL else 2)
+                key = (marker.ns, marker.id)
+                if marker.action == Marker.DELETEALL:
+                    self._queue.drop(list(self._known))
+                    self._known.clear()
+                elif marker.action == Marker.DELETE:
+                    self._known.pop(key, None)
+                else:
+                    self._known[key] = marker
+                self._put(topics.MAP_MARKERS, key, marker, 1 if marker.action == Marker.DELETEALL else 2)
 
     def _seldom(self, topic: str, thinned: Callable[[Any], Any]) -> Callable[[Any], None]:
         """Return what takes the messages of a topic, of which few are sent."""
@@ -96,7 +93,7 @@ class ThinLink:
     def _put(self, topic: str, key: Hashable, message: Any, priority: int) -> None:
         self._queue.put(key, (topic, message), _size(message), priority)
 
-    def _again(self) -> None:
+    def peer_subscribe(self, *_: object) -> None:
         """Let the whole map wait once more, for who has just come."""
         with self._lock:
             for key, marker in self._known.items():
@@ -115,16 +112,6 @@ class ThinLink:
         for topic, message in (one.item for one in sent):
             if topic != topics.MAP_MARKERS:
                 self._publishers[topic].publish(message)
-
-
-class _Latecomers(rospy.SubscribeListener):
-    """Calls back when somebody begins to listen."""
-
-    def __init__(self, call: Callable[[], None]) -> None:
-        self._call = call
-
-    def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], _peer: Callable[[Any], None]) -> None:
-        self._call()
 
 
 def _size(message: Any) -> int:

@@ -15,6 +15,7 @@ from made_harbour import (
     without_positions,
 )
 from made_models import HEADING, solver_parameters
+from made_scans import wall
 
 from mlsm_manager.joint_solver.estimate import Turns
 from mlsm_manager.joint_solver.live_solver import LiveSolver
@@ -46,10 +47,6 @@ def run(path, corners, without):
     return session, made.truth
 
 
-def no_scans(scans):
-    return []
-
-
 def no_echoes(scans):
     return deaf(scans, range(len(scans)))
 
@@ -60,7 +57,7 @@ def errors(session, truth):
     return np.hypot(*(session.path(times) - truth.at(times) + truth.at(times[:1]))[:, :2].T)
 
 
-@pytest.fixture(scope="module", params=[no_scans, no_echoes], ids=["no scans", "no echoes"])
+@pytest.fixture(scope="module", params=[lambda scans: [], no_echoes], ids=["no scans", "no echoes"])
 def harbour(request):
     return run(ahead, HARBOUR, request.param)
 
@@ -154,18 +151,12 @@ def run_in(known):
     return session, made.truth
 
 
-def blocks_of(corners, spacing=0.5):
-    """Return points (n, 2) along the walls between `corners` (k, 2)."""
-    sides = np.roll(corners, -1, axis=0) - corners
-    steps = [np.arange(0.0, 1.0, spacing / np.hypot(*side))[:, np.newaxis] for side in sides]
-    return np.concatenate([corner + step * side for corner, step, side in zip(corners, steps, sides)])
-
-
 def test_the_vehicle_is_found_where_only_the_loaded_map_was_heard():
-    session, truth = run_in(blocks_of(HARBOUR))
+    walls = [wall(start, end, 0.5) for start, end in zip(HARBOUR, np.roll(HARBOUR, -1, axis=0))]
+    session, truth = run_in(np.concatenate(walls))
     assert not session.solver.submaps.is_apart
-    path = session.path(session.solver.log.node_times[-EAST:])
-    assert np.hypot(*(path - truth.at(session.solver.log.node_times[-EAST:]))[:, :2].T).max() < 1.0
+    times = session.solver.log.node_times[-EAST:]
+    assert np.hypot(*(session.path(times) - truth.at(times))[:, :2].T).max() < 1.0
 
 
 def test_without_the_loaded_map_its_place_is_unknown():
@@ -183,48 +174,27 @@ def carried(times):
     return ahead(np.where(times > (BEFORE + 1.5) * TURN, times + CARRIED, times))
 
 
-class Carried:
-    """localiser: after the tour. expected: (3,) where the vehicle is. blocks: of the map before the silence."""
-
-    def __init__(self):
-        made = tour(BEFORE + SILENCE + SINCE, path=carried)
-        profile = {**profile_values(OdometryKind.HEADING), "start_matching": True}
-        self.localiser = MlsmCoreParameters().changed(profile).build_localiser(SONAR_IN_BASE)
-        self.take(made.scans[:BEFORE])
-        self.blocks = self.localiser.blocks
-        self.take(made.scans[-SINCE:])
-        begin, end = made.truth.at(np.array([0.0, made.scans[-1].reference_time]))
-        self.expected = end - begin * [1.0, 1.0, 0.0]
-
-    def take(self, scans):
-        """Give scans, and clouds of the same echoes, to the localiser."""
-        for scan in scans:
-            scan = without_positions(scan)
-            self.localiser.take_scan(scan)
-            self.localiser.take_cloud(MapCloud.of_scan(scan))
-
-
-@pytest.fixture(scope="module")
-def carried_run():
-    return Carried()
-
-
 def far_from(blocks, others):
     """Return how many of `blocks` are more than 2 m from all `others`."""
     distance = np.linalg.norm(blocks.mean[:, np.newaxis, :2] - others.mean[:, :2], axis=-1)
     return int((distance.min(axis=1) > 2.0).sum())
 
 
-def test_1_what_it_hears_after_the_silence_lies_apart(carried_run):
-    assert far_from(carried_run.localiser.blocks, carried_run.blocks) > 50
+def test_a_vehicle_found_in_the_map_from_before_takes_out_of_it_what_lay_apart_since():
+    made = tour(BEFORE + SILENCE + SINCE, path=carried)
+    localiser = MlsmCoreParameters().changed(profile_values(OdometryKind.HEADING)).build_localiser(SONAR_IN_BASE)
 
+    def take(scans):
+        for scan in map(without_positions, scans):
+            localiser.take_scan(scan)
+            localiser.take_cloud(MapCloud.of_scan(scan))
 
-def test_2_it_is_found_in_the_map_from_before(carried_run):
-    found = carried_run.localiser.relocalise()
-    assert found.accepted
-    assert found.forgotten == SINCE
-    np.testing.assert_allclose(found.result.pose[:2], carried_run.expected[:2], atol=0.3)
-
-
-def test_3_what_lay_apart_is_not_in_the_map_any_more(carried_run):
-    assert far_from(carried_run.localiser.blocks, carried_run.blocks) == 0
+    take(made.scans[:BEFORE])
+    before = localiser.blocks
+    take(made.scans[-SINCE:])
+    assert far_from(localiser.blocks, before) > 50
+    found = localiser.relocalise()
+    assert (found.accepted, found.forgotten) == (True, SINCE)
+    begin, end = made.truth.at(np.array([0.0, made.scans[-1].reference_time]))
+    np.testing.assert_allclose(found.result.pose[:2], (end - begin)[:2], atol=0.3)
+    assert far_from(localiser.blocks, before) == 0

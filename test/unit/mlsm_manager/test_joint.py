@@ -30,6 +30,11 @@ def localiser_after(count, scans=SCANS, **changes):
     return localiser, [localiser.take_scan(scan).scan for scan in scans[:count]]
 
 
+def off(update, scan):
+    """Return by how many metres a scan was put beside where it was heard."""
+    return np.hypot(*(update.belief.theta[:2] - scan.reference_pose[:2]))
+
+
 @pytest.fixture(scope="module")
 def run():
     """Return a localiser after six scans, and its updates, which are only looked at."""
@@ -52,20 +57,13 @@ def test_a_scan_in_which_nothing_is_heard_is_no_fix():
     assert age == pytest.approx(scan.reference_time - SCANS[4].reference_time)
 
 
-def test_the_map_has_all_points_of_all_scans(run):
-    localiser, _ = run
-    assert localiser.blocks.mean[:, 3].min() > 0.0
-    assert localiser.block_count == len(localiser.blocks) > 100
-
-
 def test_matching_off_and_on_again_goes_on_from_the_same_place():
     localiser, _ = localiser_after(6)
     localiser.match(False)
     localiser.take_scan(SCANS[6])
     assert localiser.verdicts() == []
     localiser.match(True)
-    update = localiser.take_scan(SCANS[7]).scan
-    assert np.hypot(*(update.belief.theta[:2] - SCANS[7].reference_pose[:2])) < 0.3
+    assert off(localiser.take_scan(SCANS[7]).scan, SCANS[7]) < 0.3
 
 
 def test_a_map_that_was_made_without_matching_is_matched_with():
@@ -81,7 +79,7 @@ def test_a_vehicle_that_was_found_again_goes_on_from_there():
     assert localiser.estimator.session is None
     found = localiser.take_scan(SCANS[2]).scan
     assert found.result is not None
-    assert np.hypot(*(found.belief.theta[:2] - SCANS[2].reference_pose[:2])) < 0.5
+    assert off(found, SCANS[2]) < 0.5
 
 
 def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
@@ -89,8 +87,8 @@ def test_a_cloud_from_before_the_run_stays_where_the_odometry_had_it():
     early = MapCloud.of_scan(SCANS[3])
     assert localiser.take_cloud(early).report.inserted == len(early)
     low, high = early.points[:, :2].min(axis=0), early.points[:, :2].max(axis=0)
-    assert (localiser.blocks.mean[:, :2] >= low - 1e-6).all()
-    assert (localiser.blocks.mean[:, :2] <= high + 1e-6).all()
+    means = localiser.blocks.mean[:, :2]
+    assert ((means >= low - 1e-6) & (means <= high + 1e-6)).all()
 
 
 def test_points_beyond_the_limit_are_counted_before_anybody_looks_at_the_map():
@@ -107,8 +105,7 @@ def test_a_long_silence_is_followed_by_the_odometry():
     assert [localiser.silent_since(end + seconds) for seconds in (119.0, 121.0)] == [None, end]
     localiser.follow(SCANS[8].track, later)
     assert localiser.believed_until == later
-    update = localiser.take_scan(SCANS[9]).scan
-    assert np.hypot(*(update.belief.theta[:2] - SCANS[9].reference_pose[:2])) < 0.5
+    assert off(localiser.take_scan(SCANS[9]).scan, SCANS[9]) < 0.5
 
 
 def test_a_run_says_whether_it_can_be_trusted(run):
@@ -116,8 +113,9 @@ def test_a_run_says_whether_it_can_be_trusted(run):
 
 
 def test_the_first_turn_is_not_doubted_for_a_speed_that_only_the_second_tells():
-    names = [[verdict.name for verdict in localiser_after(turns)[0].verdicts()] for turns in (1, 2)]
-    assert ["position uncertainty" in of_turns for of_turns in names] == [False, True]
+    for turns in (1, 2):
+        names = [verdict.name for verdict in localiser_after(turns)[0].verdicts()]
+        assert ("position uncertainty" in names) == (turns == 2)
 
 
 def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
@@ -127,9 +125,10 @@ def test_a_run_without_a_dvl_says_whether_its_scans_lie_on_those_before():
     assert again.value == first.value
 
 
-def test_late_beams_make_it_wait_for_odometry():
-    assert localiser_after(0, sonar_delay_deviation=0.0)[0].estimator.lookahead == 0.0
-    assert localiser_after(0, sonar_delay_deviation=0.1)[0].estimator.lookahead == pytest.approx(0.3)
+@pytest.mark.parametrize(("deviation", "seconds"), [(0.0, 0.0), (0.1, 0.3)])
+def test_late_beams_make_it_wait_for_odometry(deviation, seconds):
+    localiser, _ = localiser_after(0, sonar_delay_deviation=deviation)
+    assert localiser.estimator.lookahead == pytest.approx(seconds)
 
 
 def test_free_space_is_known_between_the_vehicle_and_the_walls(run):
@@ -187,23 +186,25 @@ def test_a_named_odometry_is_not_asked_for():
     assert localiser_after(3, WITHOUT_POSITIONS, odometry=OdometryKind.DVL)[0].odometry == ""
 
 
+@pytest.fixture(scope="module")
+def nine():
+    """Return a localiser after nine scans, and its updates, which are only looked at."""
+    return localiser_after(9)
+
+
 @pytest.mark.parametrize("size", [30.0, 5.0])
-def test_a_jump_of_the_odometry_leaves_position_and_map_where_they_are(size):
-    jumped, whole = localiser_after(0)[0], localiser_after(0)[0]
-    moment = SCANS[4].reference_time + 3.0
-    for scan in SCANS[:9]:
-        after, track = scan.times > moment, scan.track
-        poses = track.poses + size * np.outer(track.times > moment, [1.0, 0.5, 0.0])
-        points = scan.points + size * np.outer(after, [1.0, 0.5, 0.0, 0.0])
-        update = jumped.take_scan(replace(scan, points=points, track=Track(track.times, poses))).scan
-        other = whole.take_scan(scan).scan
+def test_a_jump_of_the_odometry_leaves_the_position_where_it_is(nine, size):
+    (whole, updates), (jumped, _) = nine, localiser_after(0)
+    moment, jump = SCANS[4].reference_time + 3.0, size * np.array([1.0, 0.5, 0.0])
+    for scan, other in zip(SCANS, updates):
+        track = scan.track.with_poses(scan.track.poses + np.outer(scan.track.times > moment, jump))
+        points = scan.points + np.outer(scan.times > moment, [*jump, 0.0])
+        update = jumped.take_scan(replace(scan, points=points, track=track)).scan
         assert np.hypot(*(update.belief.theta - other.belief.theta)[:2]) < 0.5
     (step,) = jumped.following.odometry.steps
     assert step.time == pytest.approx(moment, abs=0.5)
-    now, pose = SCANS[8].reference_time, SCANS[8].reference_pose
-    places = [composed(one.following.correction(now + 1.0, odom), odom) for one, odom in (
-        (jumped, pose + size * np.array([1.0, 0.5, 0.0])), (whole, pose)
-    )]  # fmt: skip
+    now, pose = SCANS[8].reference_time + 1.0, SCANS[8].reference_pose
+    places = [composed(one.following.correction(now, at), at) for one, at in ((jumped, pose + jump), (whole, pose))]
     assert np.hypot(*(places[0] - places[1])[:2]) < 0.5
 
 
@@ -219,46 +220,37 @@ def test_a_position_grows_old_and_uncertain_where_no_scan_comes():
     assert health.report().level is Level.ERROR
 
 
+def known_to(variance, by_mounts=0.0):
+    return PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3), 7, by_mounts)
+
+
+DOUBT = ["two submaps"]
+
+
 def test_the_first_fixes_are_provisional_and_what_they_leave_open_is_no_problem():
-    place = PlaceNow(100.0, 10.0, 0.0, 18.0 * np.eye(3), 2)
-    health = Health("mlsm_core", lambda line: None)
-    report_place(health, place)
-    assert health.report().level is Level.OK
-    known = place._replace(covariance=0.1 * np.eye(3))
-    states = [position_state(known._replace(fixes=fixes), False, False, [])[0] for fixes in (6, 7)]
+    states = [position_state(known_to(0.1)._replace(fixes=fixes), False, False, [])[0] for fixes in (6, 7)]
     assert states == [PositionState.PROVISIONAL, PositionState.GOOD]
-    report_place(health, place._replace(fixes=3))
-    assert health.report().level is Level.ERROR
+    health = Health("mlsm_core", lambda line: None)
+    for fixes, level in ((2, Level.OK), (3, Level.ERROR)):
+        report_place(health, known_to(18.0)._replace(fixes=fixes))
+        assert health.report().level is level
 
 
 @pytest.mark.parametrize(
-    ("variance", "is_lost", "is_provisional", "doubts", "state"),
+    ("place", "is_lost", "is_provisional", "doubts", "state", "told"),
     [
-        (0.08, False, False, [], PositionState.GOOD),
-        (0.08, False, True, [], PositionState.PROVISIONAL),
-        (0.08, False, True, ["two submaps"], PositionState.DOUBTFUL),
-        (13.0, False, False, ["two submaps"], PositionState.UNKNOWN),
-        (0.08, True, False, [], PositionState.UNKNOWN),
+        (known_to(0.08), False, False, [], PositionState.GOOD, "position good, 0.4 m"),
+        (known_to(0.08), False, True, [], PositionState.PROVISIONAL, "position provisional: no two scans agree yet"),
+        (known_to(0.08), False, True, DOUBT, PositionState.DOUBTFUL, "position doubtful, 0.4 m: two submaps"),
+        (known_to(13.0), False, False, DOUBT, PositionState.UNKNOWN, "position not known, 5.1 m; two submaps"),
+        (known_to(18.0, 5.0), False, False, [], PositionState.GOOD, "position good, 6.0 m (3.3 m in the map)"),
+        (known_to(18.0, 2.0), False, False, [], PositionState.UNKNOWN, "position not known, 5.7 m"),
+        (known_to(0.08), True, False, [], PositionState.UNKNOWN, "position lost: it is searched for in the whole map"),
+        (None, False, True, DOUBT, PositionState.UNKNOWN, "no position yet; two submaps"),
     ],
 )
-def test_a_position_is_good_only_where_nothing_speaks_against_it(variance, is_lost, is_provisional, doubts, state):
-    place = PlaceNow(100.0, 10.0, 0.0, variance * np.eye(3), 7)
-    found, text = position_state(place, is_lost, is_provisional, doubts)
-    assert found is state
-    assert all(doubt in text for doubt in doubts) or state is PositionState.UNKNOWN
-    assert position_state(None, is_lost, is_provisional, doubts)[0] is PositionState.UNKNOWN
-
-
-@pytest.mark.parametrize(
-    ("by_mounts", "told"),
-    [
-        (5.0, (PositionState.GOOD, "position good, 6.0 m (3.3 m in the map)")),
-        (2.0, (PositionState.UNKNOWN, "position not known, 5.7 m")),
-    ],
-)
-def test_a_place_in_the_map_is_known_where_nothing_but_the_yaw_of_the_sonar_is_not(by_mounts, told):
-    place = PlaceNow(100.0, 10.0, 0.0, 18.0 * np.eye(3), 7, by_mounts)
-    assert position_state(place, False, False, []) == told
+def test_a_position_is_good_only_where_nothing_speaks_against_it(place, is_lost, is_provisional, doubts, state, told):
+    assert position_state(place, is_lost, is_provisional, doubts) == (state, told)
 
 
 JUMP = Cause("odometry jumped by 30.0 m", 1e3, 88.0, is_mended=True, metres=0.5)
@@ -296,8 +288,7 @@ def test_an_odometry_that_goes_on_over_an_hour_keeps_the_vehicle_in_its_place():
         localiser.following.correction(end, pose)
         assert localiser.notice_time(end + 1.0 + hour, pose) * hour < 0.0
         np.testing.assert_allclose(localiser.following.correction(end + 1.0 + hour, pose), expected, atol=1e-9)
-        found = localiser.take_scan(later(SCANS[6], hour)).scan
-        assert np.hypot(*(found.belief.theta[:2] - SCANS[6].reference_pose[:2])) < 0.5
+        assert off(localiser.take_scan(later(SCANS[6], hour)).scan, SCANS[6]) < 0.5
 
 
 def test_a_vehicle_that_stands_is_expected_where_it_was_when_its_clock_is_set_back():
@@ -322,7 +313,7 @@ def test_where_somebody_points_at_the_vehicle_it_is_searched():
     localiser.expect(pose, np.diag([0.25, 0.25, 0.07]), composed(shift, scan.reference_pose))
     found = localiser.take_scan(moved(scan, shift)).scan
     assert found.accepted
-    assert np.hypot(*(found.belief.theta[:2] - scan.reference_pose[:2])) < 0.3
+    assert off(found, scan) < 0.3
 
 
 @pytest.mark.long
@@ -332,7 +323,7 @@ def test_after_a_jump_in_time_and_of_the_odometry_the_vehicle_is_found_in_its_ma
     localiser.notice_time(-3600.0)
     updates = [localiser.take_scan(moved(scan, shift)).scan for scan in SCANS[3:9]]
     assert [update.accepted for update in updates] == [False] + [True] * 5
-    assert np.hypot(*(updates[-1].belief.theta[:2] - SCANS[8].reference_pose[:2])) < 0.5
+    assert off(updates[-1], SCANS[8]) < 0.5
     assert sum(tuple(cell) not in before for cell in localiser.blocks.cells.tolist()) < 0.2 * len(before)
 
 

@@ -19,8 +19,8 @@ FREE_SCANS = 4
 PARAMETERS = MlsmCoreParameters(size_x_meters=0.0, size_y_meters=0.0, free_scans=FREE_SCANS)
 
 
-def new_localiser():
-    return PARAMETERS.build_localiser(SONAR_IN_BASE)
+def new_localiser(**changes):
+    return PARAMETERS.changed(changes).build_localiser(SONAR_IN_BASE)
 
 
 def taken(localiser, scans):
@@ -47,9 +47,11 @@ def whole():
     return localiser, taken(localiser, HARBOUR.scans)
 
 
-def resumed(stored, same_odometry=True):
+def resumed(stored, has_run=True):
+    """Return a localiser that starts in a stored map, with its run or with the place alone."""
+    place = {name: array for name, array in stored.arrays.items() if not name.startswith("run.")}
     localiser = new_localiser()
-    localiser.restore(stored, same_odometry)
+    localiser.restore(stored if has_run else replace(stored, arrays=place), same_odometry=True)
     return localiser
 
 
@@ -61,11 +63,6 @@ def begun_anew(scans):
 def sector_of(scan, beams=14):
     """Return the first beams of a scan, which hear one wall and say nothing of the way along it."""
     return selected(scan, np.arange(beams))
-
-
-def without_a_run(stored):
-    place = {name: array for name, array in stored.arrays.items() if not name.startswith("run.")}
-    return replace(stored, arrays=place)
 
 
 def test_a_resumed_run_goes_on_as_if_it_had_never_ended(stored, whole):
@@ -89,7 +86,7 @@ def test_what_was_stored_stays_as_it_is_while_scans_are_taken(stored):
 
 @pytest.mark.parametrize("has_run", [True, False])
 def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(stored, has_run):
-    localiser = resumed(stored if has_run else without_a_run(stored))
+    localiser = resumed(stored, has_run)
     before = localiser.blocks.rows.copy()
     updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 3]))
     assert [update.accepted for update in updates] == [False, False, False]
@@ -97,13 +94,13 @@ def test_a_vehicle_whose_odometry_began_anew_writes_nothing_before_it_is_found(s
     np.testing.assert_array_equal(localiser.blocks.rows, before)
 
 
-@pytest.mark.parametrize(("has_run", "goes_on"), [(True, True), (False, False)])
-def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(stored, has_run, goes_on):
-    localiser = resumed(stored if has_run else without_a_run(stored))
-    (update,) = taken(localiser, [sector_of(HARBOUR.scans[KILLED_AFTER])])
-    assert update.accepted == goes_on
-    true_place = HARBOUR.truth.at(np.array([HARBOUR.scans[KILLED_AFTER].reference_time]))[0]
-    assert not goes_on or np.hypot(*(update.belief.theta[:2] - true_place[:2])) < 0.5
+@pytest.mark.parametrize("has_run", [True, False])
+def test_a_scan_that_says_too_little_to_be_matched_is_enough_for_a_run_to_go_on(stored, has_run):
+    scan = HARBOUR.scans[KILLED_AFTER]
+    (update,) = taken(resumed(stored, has_run), [sector_of(scan)])
+    assert update.accepted == has_run
+    if has_run:
+        assert np.hypot(*(update.belief.theta[:2] - HARBOUR.truth.at(scan.reference_time)[:2])) < 0.5
 
 
 def test_a_run_goes_on_with_a_scan_whose_first_half_lacks_odometry(stored, whole):
@@ -126,7 +123,7 @@ def test_a_scan_without_echoes_after_a_restart_leaves_the_run_for_the_next_one(s
 @pytest.mark.parametrize("has_run", [True, False])
 def test_it_is_found_by_relocalisation_and_no_wall_is_there_twice(killed, stored, whole, has_run):
     whole, wanted = whole
-    localiser = resumed(stored if has_run else without_a_run(stored))
+    localiser = resumed(stored, has_run)
     updates = taken(localiser, begun_anew(HARBOUR.scans[KILLED_AFTER:]))
     assert [update.accepted for update in updates[:5]] == [False, False, False, False, True]
     assert not localiser.is_lost
@@ -161,22 +158,16 @@ def test_a_run_that_does_not_fit_leaves_the_map_alone(stored, name, array):
     assert taken(localiser, HARBOUR.scans[KILLED_AFTER : KILLED_AFTER + 1])[0].accepted
 
 
-def test_a_run_with_another_odometry_profile_is_refused(stored):
-    other = PARAMETERS.changed({"odometry": "THRUSTERS"}).build_localiser(SONAR_IN_BASE)
-    told = "it was stored with another odometry profile: DvlFactors, not ThrusterFactors"
-    assert other.restore(stored, same_odometry=True) == told
-    assert other.estimator.session is None
-    assert other.block_count == len(stored.shown)
-
-
-def test_two_profiles_with_as_many_unknowns_are_told_apart():
-    scans, made = HARBOUR.scans[:3], {}
-    for kind in ("THRUSTERS", "NONE"):
-        made[kind] = PARAMETERS.changed({"odometry": kind}).build_localiser(SONAR_IN_BASE)
-    taken(made["THRUSTERS"], scans)
-    stored = made["THRUSTERS"].stored("map", {}, 0.0, "run")
-    told = "it was stored with another odometry profile: ThrusterFactors, not UnaidedFactors"
-    assert made["NONE"].restore(stored, same_odometry=True) == told
+@pytest.mark.parametrize(
+    ("kind", "other", "told"),
+    [("AUTO", "THRUSTERS", "DvlFactors, not ThrusterFactors"), ("THRUSTERS", "NONE", "ThrusterFactors, not Unaided")],
+)
+def test_a_run_with_another_odometry_profile_is_refused_also_where_it_has_as_many_unknowns(kind, other, told):
+    before, after = new_localiser(odometry=kind), new_localiser(odometry=other)
+    taken(before, HARBOUR.scans[:3])
+    reason = after.restore(before.stored("map", {}, 0.0, "run"), same_odometry=True)
+    assert reason.startswith(f"it was stored with another odometry profile: {told}")
+    assert (after.estimator.session, after.block_count) == (None, before.block_count)
 
 
 def test_a_run_is_only_stored_for_the_run_of_the_graph_that_can_go_on_with_it(killed):

@@ -69,43 +69,36 @@ def test_it_equals_a_map_that_is_made_of_all_final_places(steps, last):
     assert shown.moving == []
 
 
-def map_of(*numbers):
-    shown = KeyframeMap(RESOLUTION, LIMIT)
-    for number in numbers:
-        shown.add(patch(number))
-    return shown
+AWAY = MovedBy(2.0)
+PLACES = [patch(0).points, *(AWAY.heard(patch(number))[0] for number in (1, 2))]
+"""Of keyframes 0 to 2, after the newer two were moved."""
 
 
-def test_a_settled_keyframe_stays_where_it_was_drawn():
-    shown = map_of(1, 2)
-    shown.draw(MovedBy(0.0), settled_until=1.0)
-    assert len(shown.moving) == 1
-    shown.draw(MovedBy(50.0), settled_until=1.0)
-    assert_same(shown.map.blocks, made_at_once(patch(1).points, MovedBy(50.0).heard(patch(2))[0]))
-
-
-def with_three_keyframes():
+@pytest.fixture
+def three():
     """Return a map of keyframes 0 to 2, of which the oldest is settled."""
     shown = KeyframeMap(RESOLUTION, LIMIT)
     for number in range(3):
         shown.add(patch(number))
-        shown.draw(MovedBy(0.0), 0.0)
+        shown.draw(MovedBy(0.0), settled_until=0.0)
     return shown
 
 
-def test_a_copy_ends_at_a_time_and_leaves_the_map_as_it_was():
-    shown, placement = with_three_keyframes(), MovedBy(2.0)
-    older = shown.drawn_until(1.0, placement)
-    assert_same(older.blocks, made_at_once(patch(0).points, placement.heard(patch(1))[0]))
-    everything = [patch(0).points, placement.heard(patch(1))[0], placement.heard(patch(2))[0]]
-    assert_same(shown.map.blocks, made_at_once(*everything))
+def test_a_settled_keyframe_stays_where_it_was_drawn(three):
+    assert len(three.moving) == 2
+    three.draw(AWAY, settled_until=0.0)
+    assert_same(three.map.blocks, made_at_once(*PLACES))
 
 
-def test_what_is_settled_until_a_time_forgets_the_keyframes_after_it():
-    shown = with_three_keyframes()
-    shown.settle(MovedBy(2.0), 1.0)
-    assert_same(shown.map.blocks, made_at_once(patch(0).points, MovedBy(2.0).heard(patch(1))[0]))
-    assert not shown.moving
+def test_a_copy_ends_at_a_time_and_leaves_the_map_as_it_was(three):
+    assert_same(three.drawn_until(1.0, AWAY).blocks, made_at_once(*PLACES[:2]))
+    assert_same(three.map.blocks, made_at_once(*PLACES))
+
+
+def test_what_is_settled_until_a_time_forgets_the_keyframes_after_it(three):
+    three.settle(AWAY, 1.0)
+    assert_same(three.map.blocks, made_at_once(*PLACES[:2]))
+    assert not three.moving
 
 
 def cloud(number, *echoes):
@@ -114,12 +107,14 @@ def cloud(number, *echoes):
     return MapCloud(points, number + 0.001 * np.arange(len(points)), float(number))
 
 
-def carved_map(*clouds, place=None):
+def carved_map(*clouds, place=MovedBy(0.0), wall=None):
+    """Return a map in which keyframes were drawn one after the other; wall: (m, 4), of points that were there."""
     made = KeyframeMap(RESOLUTION, LIMIT, carver=CARVER)
+    if wall is not None:
+        made.insert(wall)
     for keyframe in clouds:
         made.add(keyframe)
-        if place is not None:
-            made.draw(place, NEVER)
+        made.draw(place, NEVER)
     return made
 
 
@@ -151,7 +146,7 @@ def test_what_is_settled_is_as_if_every_keyframe_had_carved_once_from_its_last_p
 @pytest.mark.parametrize("looks", [True, False])
 def test_many_keyframes_that_move_at_once_are_followed_a_few_with_each_scan(looks):
     """What nobody looked at in between is followed with the next look."""
-    shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)), place=MovedBy(0.0))
+    shown = carved_map(*(cloud(number, (10.25, 0.25)) for number in range(5)))
     assert {y for _, y in cells(shown.free.blocks)} <= {-1, 0, 1}
     shown.draw(MovedBy(5.0), NEVER)
     assert not looks or {y for _, y in cells(shown.free.blocks)} >= {0, 10}
@@ -161,46 +156,37 @@ def test_many_keyframes_that_move_at_once_are_followed_a_few_with_each_scan(look
     assert {y for _, y in cells(shown.free.blocks)} <= {9, 10, 11}
 
 
-def crossed_wall(crossings):
-    """Return a map with a settled block at x = 5 m and keyframes that look through it along y = 0."""
-    through = [cloud(number, (20.25, 0.25)) for number in range(1, crossings + 1)]
-    shown = KeyframeMap(RESOLUTION, LIMIT, carver=CARVER)
-    shown.insert(np.array([[5.25, 0.25, -2.0, 50.0]]))
-    for keyframe in through:
-        shown.add(keyframe)
-        shown.draw(MovedBy(0.0), NEVER)
-    return shown
+def crossed_wall(*places):
+    """Return a map with a settled block at x = 5 m and keyframes with an echo at x [m] each along y = 0."""
+    keyframes = [cloud(number, (x, 0.25)) for number, x in enumerate(places, 1)]
+    return carved_map(*keyframes, wall=np.array([[5.25, 0.25, -2.0, 50.0]]))
 
 
-def test_a_block_that_moving_keyframes_look_through_goes():
-    assert (10, 0) in cells(crossed_wall(6).map.blocks)
-    assert (10, 0) not in cells(crossed_wall(7).map.blocks)
+BEHIND = 20.25
+
+
+@pytest.mark.parametrize(
+    ("places", "stays"), [([BEHIND] * 6, True), ([BEHIND] * 7, False), ([BEHIND] * 6 + [5.25] + [BEHIND] * 2, True)]
+)
+def test_a_block_goes_that_enough_moving_keyframes_look_through_and_none_hears(places, stays):
+    assert ((10, 0) in cells(crossed_wall(*places).map.blocks)) == stays
 
 
 def test_it_is_there_again_when_they_turn_out_to_have_looked_beside_it():
-    shown = crossed_wall(7)
+    shown = crossed_wall(*[BEHIND] * 7)
     for _ in range(4):
         shown.draw(MovedBy(5.0), NEVER)
     assert (10, 0) in cells(shown.map.blocks)
 
 
 def test_it_is_gone_for_ever_when_they_are_settled():
-    shown = crossed_wall(7)
+    shown = crossed_wall(*[BEHIND] * 7)
     assert shown.draw(MovedBy(0.0), settled_until=np.inf).removed == 1
     assert cells(shown.map.blocks) == [(40, 0)]
 
 
-def test_a_block_that_is_heard_again_stays():
-    shown = crossed_wall(6)
-    shown.add(cloud(7, (5.25, 0.25)))
-    for number in (8, 9):
-        shown.add(cloud(number, (20.25, 0.25)))
-        shown.draw(MovedBy(0.0), NEVER)
-    assert (10, 0) in cells(shown.map.blocks)
-
-
 def test_what_is_inserted_in_between_keeps_the_keyframes_in_the_map():
-    shown = carved_map(cloud(1, (10.25, 0.25)), place=MovedBy(0.0))
+    shown = carved_map(cloud(1, (10.25, 0.25)))
     points = np.array([[0.25, 9.25, -2.0, 50.0]])
     shown.insert(points)
     shown.carve(points, np.array([2.0]), ORIGIN[np.newaxis])

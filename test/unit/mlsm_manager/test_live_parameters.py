@@ -30,26 +30,20 @@ def written(tmp_path):
     return path
 
 
-def test_every_node_takes_its_part(written):
+def test_every_node_takes_its_part_and_the_live_matcher_and_mapper_are_those_of_the_replay(written):
     values = yaml.safe_load(written.read_text())
     assert set(values) == set(NODES)
     cloud, echoes, core = (NODES[name].from_mapping(values[name]) for name in NODES)
     assert (cloud.sonar_delay, cloud.range_scale, echoes.spacing, core.echo_deviation) == (0.9, 0.97, 0.7, 0.3)
     assert (cloud.target_frame, core.odom_frame, core.base_frame) == ("dead_reckoning", "dead_reckoning", "hull")
-    assert core.start_matching
-    assert core.map_input is MapInput.MATCHED
+    assert (core.start_matching, core.map_input) == (True, MapInput.MATCHED)
+    assert vars(core.build_matcher()) == vars(USED.build_matcher())
+    assert core.map_settings() == USED.map_settings()
 
 
 def test_a_comment_says_what_it_is_for(written):
-    assert written.read_text().startswith(
-        "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take"
-    )
-
-
-def test_the_live_matcher_and_mapper_are_those_of_the_replay(written):
-    core = NODES["mlsm_core"].from_mapping(yaml.safe_load(written.read_text())["mlsm_core"])
-    assert vars(core.build_matcher()) == vars(USED.build_matcher())
-    assert core.map_settings() == USED.map_settings()
+    told = "# Written by map_bag. mapping.launch, vehicle.launch and play_bag.launch take"
+    assert written.read_text().startswith(told)
 
 
 ANY_FRAME = st.sampled_from(["odom", "map", "corrected_map", "base_link", "5", "true", "\u00e9 #: x"])
@@ -68,14 +62,9 @@ def values_of(field):
     return st.one_of(st.sampled_from([field.type(told.low), field.type(told.high)]), kind(told.low, told.high))
 
 
-def allowed_together(values):
-    """Return values without parts of turns where no heading is known."""
-    return {**values, "parts_per_turn": 1} if values["odometry"] is OdometryKind.NONE else values
-
-
 ANY_PARAMETERS = st.fixed_dictionaries(
     {field.name: values_of(field) for field in dataclasses.fields(ReplayParameters)}
-).map(allowed_together)
+).filter(lambda values: values["odometry"] is not OdometryKind.NONE or values["parts_per_turn"] == 1)
 
 
 @lru_cache(maxsize=None)
@@ -96,8 +85,16 @@ def test_the_nodes_take_whatever_a_replay_takes(values, odom_frame, base_frame):
     assert ReplayParameters.from_mapping(replay_values(live)[0]) == parameters
 
 
-def test_plain_keys_stay_as_they_are_and_those_for_experts_may_stand_under_a_key_of_their_own():
-    assert replay_values({"carve": False, "expert": {"free_scans": 30}}) == ({"carve": False, "free_scans": 30}, [])
+@pytest.mark.parametrize(
+    ("given", "values"),
+    [
+        ({"carve": False, "expert": {"free_scans": 30}}, {"carve": False, "free_scans": 30}),
+        ({"sonar_to_cloud": {"scan_size": 200, "beam_width": 0.1}}, {}),
+    ],
+    ids=["plain keys and those for experts", "what only the live node knows"],
+)
+def test_a_replay_takes_what_it_knows(given, values):
+    assert replay_values(given) == (values, [])
 
 
 def test_a_file_of_an_older_version_is_taken_and_its_keys_are_named():
@@ -116,10 +113,6 @@ def test_a_file_of_an_older_version_is_taken_and_its_keys_are_named():
         "rate_time -> rate_correlation_time",
         "estimator = SCAN_BY_SCAN -> JOINT",
     ]
-
-
-def test_what_only_the_live_node_knows_is_left_out():
-    assert replay_values({"sonar_to_cloud": {"scan_size": 200, "beam_width": 0.1}}) == ({}, [])
 
 
 @pytest.mark.parametrize("group", [{"sonar_delay": 99.0}, {"no_such": 1}, [1]])
@@ -146,14 +139,10 @@ def test_launch_files_load_it_over_the_nodes_own(launch, written):
     assert found["/sonar_to_cloud/scan_size"] == 120
 
 
-def test_without_it_the_nodes_own_hold():
+def test_without_it_the_nodes_own_hold_and_an_argument_goes_before_it(written):
     assert launched("mapping.launch")["/mlsm_core/sonar_delay_deviation"] == 1.0
-
-
-def test_an_argument_goes_before_it(written):
-    assert launched("mapping.launch", f"parameters:={written}", "estimator:=THESIS")["/mlsm_core/estimator"] == (
-        "THESIS"
-    )
+    found = launched("mapping.launch", f"parameters:={written}", "estimator:=JOINT")
+    assert found["/mlsm_core/estimator"] == "JOINT"
 
 
 NAMES = ("range_scale_error", "sonar_delay", "odometry_scale", "odometry_direction")
@@ -186,8 +175,9 @@ def test_a_user_meets_no_more_parameters_than_fit_on_a_page():
     assert len(dataclasses.fields(MlsmCoreParameters)) - len(MlsmCoreParameters.expert_names()) <= 40
 
 
-def test_the_default_reserves_the_thesis_basin():
-    assert MlsmCoreParameters().expected_blocks == 240 * 100
+@pytest.mark.parametrize(("values", "blocks"), [({}, 240 * 100), ({"size_x_meters": 0, "size_y_meters": 0}, 0)])
+def test_the_default_reserves_the_thesis_basin_and_nothing_must_be(values, blocks):
+    assert MlsmCoreParameters(**values).expected_blocks == blocks
 
 
 @pytest.mark.parametrize(
@@ -201,7 +191,3 @@ def test_the_default_reserves_the_thesis_basin():
 def test_values_that_contradict_each_other_or_that_no_memory_holds_are_refused(values, reason):
     with pytest.raises(ParameterError, match=reason):
         MlsmCoreParameters(**values)
-
-
-def test_an_extent_may_be_zero():
-    assert MlsmCoreParameters(size_x_meters=0, size_y_meters=0).expected_blocks == 0

@@ -1,6 +1,7 @@
 """The map as messages: boxes that show blocks where they are, packed as genpy would write them, and OctoMap's tree."""
 
 import sys
+from collections import Counter, defaultdict
 from importlib.machinery import ModuleSpec
 from types import ModuleType
 from typing import NamedTuple, Tuple
@@ -10,8 +11,8 @@ import genpy.dynamic
 import numpy as np
 import pytest
 from foreign_messages import serialised
-from geometry_msgs.msg import Point, Pose, Quaternion, Vector3
-from hypothesis import given
+from geometry_msgs.msg import Point, Vector3
+from hypothesis import example, given
 from hypothesis import strategies as st
 from made_maps import blocks_of, random_map
 from std_msgs.msg import Header
@@ -19,10 +20,12 @@ from visualization_msgs.msg import Marker, MarkerArray
 
 from mlsm_manager.ros.map_publisher import CLOUD_FIELDS, has_octomap_messages, map_cloud, octomap_message
 from mlsm_manager.ros.markers import COLORS, BlockMarkers
-from mlsm_manager.ros.status_teller import ellipse, status_markers, wrapped_text
+from mlsm_manager.ros.status_teller import ellipse, status_markers
+from mlsm_manager.surface_map.blocks import BlockType
 from mlsm_manager.surface_map.boxes import THINNEST, TILE_BITS, box_lists, box_size, box_type
 from mlsm_manager.surface_map.export.formats import octree, write_octree
 from mlsm_manager.surface_map.export.pictures import ColorBy, block_colors
+from node_support.geometry import matrices
 from underwater_map_construction.msg import PositionStatus
 
 HEADER = Header(seq=3, stamp=genpy.Time(12, 34), frame_id="map")
@@ -30,31 +33,26 @@ MIXED = [(0.0, 0.0), (0.0, 0.1), (-1.0, -0.7), (0.0, 0.5), (-4.0, 3.0), (0.0, 2.
 
 
 class BoxList(NamedTuple):
-    """Boxes of one size in one tile: centers (n, 3) m, owners (n,) indices of the blocks that they show."""
+    """Boxes of one type and size (3,) m in one tile: centers (n, 3) m, owners (n,) of the blocks that they show."""
 
-    resolution: float
+    type: BlockType
+    size: np.ndarray
     tile: Tuple[int, int]
-    power: int
     centers: np.ndarray
     owners: np.ndarray
-
-    @property
-    def type(self):
-        return box_type(self.power)
-
-    @property
-    def size(self):
-        return np.array(box_size(self.resolution, self.power))
 
 
 def boxes_by_list(blocks):
     """Return the lists of boxes that show `blocks`."""
     lists = box_lists(blocks)
     parts = [slice(start, end) for start, end in zip(lists.starts, lists.starts[1:])]
-    kinds = zip(map(tuple, lists.tiles.tolist()), lists.powers.tolist(), parts)
     return [
-        BoxList(blocks.resolution, tile, power, lists.centers[part], lists.owners[part]) for tile, power, part in kinds
-    ]
+        BoxList(
+            box_type(power), np.array(box_size(blocks.resolution, power)), tuple(tile), lists.centers[part],
+            lists.owners[part],
+        )
+        for tile, power, part in zip(lists.tiles.tolist(), lists.powers.tolist(), parts)
+    ]  # fmt: skip
 
 
 def _read(message):
@@ -62,17 +60,10 @@ def _read(message):
 
 
 def _object_by_object(boxes, number):
-    return Marker(
-        header=HEADER,
-        ns=boxes.type.name.lower(),
-        id=number,
-        type=Marker.CUBE_LIST,
-        action=Marker.ADD,
-        pose=Pose(orientation=Quaternion(w=1.0)),
-        scale=Vector3(*boxes.size),
-        color=COLORS[boxes.type],
-        points=[Point(*center) for center in boxes.centers],
-    )
+    marker = Marker(header=HEADER, ns=boxes.type.name.lower(), id=number, type=Marker.CUBE_LIST)
+    marker.pose.orientation.w, marker.scale, marker.color = 1.0, Vector3(*boxes.size), COLORS[boxes.type]
+    marker.points = [Point(*center) for center in boxes.centers]
+    return marker
 
 
 @pytest.mark.parametrize("intervals", [MIXED, MIXED[:1], MIXED * 200, []])
@@ -142,22 +133,15 @@ BOTTOMS = st.floats(-50.0, 50.0)
 DEPTHS = st.one_of(st.floats(0.0, 40.0), st.integers(0, 64).map(lambda eighths: eighths * 0.125))
 
 
-def _drawn(lists):
-    """Return {x y of the cell's centre: [(bottom, top) of its boxes, from below]}."""
-    drawn = {}
-    for boxes in lists:
-        for x, y, z in boxes.centers:
-            drawn.setdefault((x, y), []).append((z - boxes.size[2] / 2.0, z + boxes.size[2] / 2.0))
-    return {cell: sorted(spans) for cell, spans in drawn.items()}
-
-
 @given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20), st.sampled_from([0.1, 0.5, 1.0]))
 def test_boxes_reach_from_bottom_to_top_without_a_gap(intervals, resolution):
     blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], resolution)
-    drawn = _drawn(boxes_by_list(blocks))
-    assert len(drawn) == len(blocks)
-    for center, bottom, top in zip(blocks.centers, blocks.bottom, blocks.height):
-        spans = drawn[tuple(center)]
+    drawn = defaultdict(list)
+    for boxes in boxes_by_list(blocks):
+        for block, z in zip(boxes.owners, boxes.centers[:, 2]):
+            drawn[block].append((z - boxes.size[2] / 2.0, z + boxes.size[2] / 2.0))
+    for block, (bottom, top) in enumerate(zip(blocks.bottom, blocks.height)):
+        spans = sorted(drawn[block])
         thickness = max(top - bottom, resolution * 2.0**THINNEST)
         middle = (bottom + top) / 2.0
         assert spans[0][0] == pytest.approx(middle - thickness / 2.0, abs=1e-9)
@@ -166,11 +150,13 @@ def test_boxes_reach_from_bottom_to_top_without_a_gap(intervals, resolution):
 
 
 @given(st.lists(st.tuples(BOTTOMS, DEPTHS), min_size=1, max_size=20))
-def test_every_list_holds_blocks_of_one_kind(intervals):
+@example([(0.0, 3.0)] * 50)
+def test_a_list_holds_boxes_of_one_tile_and_kind_that_know_their_blocks(intervals):
     blocks = blocks_of([(bottom, bottom + depth) for bottom, depth in intervals], 0.5)
-    kinds = dict(zip(map(tuple, blocks.centers), blocks.type))
     for boxes in boxes_by_list(blocks):
-        assert {kinds[x, y] for x, y, _ in boxes.centers} == {boxes.type}
+        np.testing.assert_array_equal(boxes.centers[:, :2], blocks.centers[boxes.owners])
+        assert set(blocks.type[boxes.owners]) == {boxes.type}
+        assert {tuple(tile) for tile in (blocks.cells[boxes.owners] >> TILE_BITS).tolist()} == {boxes.tile}
 
 
 @pytest.mark.parametrize(("interval", "heights"), [((1.0, 3.0), [2.0]), ((0.0, 3.0), [1.0, 2.0])])
@@ -181,18 +167,10 @@ def test_a_depth_that_is_a_power_of_two_takes_one_box_and_any_other_two_that_ove
 
 
 def test_a_tile_of_metres_needs_few_lists_and_none_twice():
-    lists = boxes_by_list(blocks_of([(0.0, depth) for depth in np.linspace(0.0, 60.0, 2000)]))
-    powers = {}
-    for boxes in lists:
-        powers.setdefault(boxes.tile, []).append(boxes.power)
-    assert all(len(told) == len(set(told)) <= 11 for told in powers.values())
-
-
-def test_a_box_lies_in_its_tile_and_knows_its_block():
-    blocks = blocks_of([(0.0, 3.0)] * 50)
-    for boxes in boxes_by_list(blocks):
-        np.testing.assert_array_equal(boxes.centers[:, :2], blocks.centers[boxes.owners])
-        assert {tuple(tile) for tile in (blocks.cells[boxes.owners] >> TILE_BITS).tolist()} == {boxes.tile}
+    lists = box_lists(blocks_of([(0.0, depth) for depth in np.linspace(0.0, 60.0, 2000)]))
+    told = Counter(zip(map(tuple, lists.tiles.tolist()), lists.powers))
+    assert set(told.values()) == {1}
+    assert max(Counter(tile for tile, _ in told).values()) <= 11
 
 
 DEFINITION = f"""Header header
@@ -221,21 +199,16 @@ def message_type(monkeypatch):
     return kind
 
 
-@pytest.fixture
-def received(message_type):
-    """Return the message as it arrives."""
-    tree = octree(random_map(0).blocks, random_map(1).blocks)
-    return message_type().deserialize(serialised(octomap_message(tree, Header(frame_id="map"))))
-
-
 def test_the_type_is_that_of_octomap_msgs(message_type):
     assert message_type._md5sum == MD5
     assert has_octomap_messages()
 
 
-def test_the_message_holds_the_tree_of_a_file(tmp_path, received):
+def test_the_message_holds_the_tree_of_a_file(tmp_path, message_type):
     """octomap_msgs leaves out the header."""
-    write_octree(tmp_path / "map.bt", random_map(0).blocks, random_map(1).blocks)
+    both = random_map(0).blocks, random_map(1).blocks
+    received = message_type().deserialize(serialised(octomap_message(octree(*both), Header(frame_id="map"))))
+    write_octree(tmp_path / "map.bt", *both)
     header, tree = (tmp_path / "map.bt").read_bytes().split(b"\ndata\n", 1)
     assert np.array(received.data, dtype=np.int8).tobytes() == tree
     assert f"id {received.id}\n".encode() in header
@@ -249,25 +222,22 @@ def test_the_ellipse_of_a_position_holds_it_with_95_percent():
     np.testing.assert_allclose(np.exp(-squares / 2.0), 0.05)
 
 
-def test_a_long_status_is_wrapped_between_words():
-    text = "position doubtful, 0.4 m: " + "sonar silent for 12 s (nothing on /sonar/raw); " * 3
-    lines = wrapped_text(text).split("\n")
-    assert max(map(len, lines)) <= 52
-    assert " ".join(lines) == text.strip()
+TEXT = "position doubtful, 0.4 m: sonar silent for 12 s (nothing on /sonar/raw); " * 3
 
 
 @pytest.fixture
 def drawn():
-    status = PositionStatus(state=PositionStatus.GOOD, text="position good, 0.4 m", age=14.2)
-    status.covariance = np.eye(3).ravel()
-    T_map_base = np.eye(4)
-    T_map_base[:3, 3] = 3.0, -48.0, -2.0
+    status = PositionStatus(state=PositionStatus.DOUBTFUL, text=TEXT, age=14.2, covariance=np.eye(3).ravel())
+    T_map_base = matrices(np.array([3.0, -48.0, 0.0]))
+    T_map_base[2, 3] = -2.0
     return status_markers(status, T_map_base, 2.5, "map")
 
 
 def test_the_status_at_the_vehicle_tells_the_age_of_the_fix_and_replaces_the_one_before(drawn):
     assert drawn[0].action == Marker.DELETEALL
-    assert "position good, 0.4 m\nfix 14 s ago" in [marker.text for marker in drawn]
+    (*lines, last), *_ = [marker.text.split("\n") for marker in drawn if "\n" in marker.text]
+    assert (" ".join(lines), last) == (TEXT.strip(), "fix 14 s ago")
+    assert max(map(len, lines)) <= 52
     assert len({(marker.ns, marker.id) for marker in drawn}) == len(drawn)
 
 

@@ -36,9 +36,11 @@ def assert_ends_as_the_whole(mended, cause):
         (broken.compass_steps(WHOLE, MIDDLE, -8.0), "compass stepped by -8 deg"),
         (broken.compass_steps(WHOLE, MIDDLE, 20.0, positions_follow=False), "compass stepped by 20 deg"),
         (broken.odometry_freezes(WHOLE, MIDDLE, 20.0, goes_on=False), "odometry held for 20 s, and then right again"),
+        (broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on=False), "odometry stalled, and missed 1."),
+        (broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on=True), "odometry stalled, and missed 1."),
     ],
 )
-def test_a_step_that_no_vehicle_makes_is_left_out_and_said(recording, said):
+def test_a_step_that_no_vehicle_makes_is_left_out_and_said_and_stalls_are_bridged(recording, said):
     mended, causes = with_odometry_mended(recording, LIMITS)
     assert causes[0].text.startswith(said)
     assert causes[0].is_mended
@@ -50,13 +52,6 @@ def test_positions_that_never_change_but_jump_are_none_once_the_jump_is_left_out
     assert recording.track.reports_positions
     mended, _ = with_odometry_mended(recording, LIMITS)
     assert not mended.track.reports_positions
-
-
-@pytest.mark.parametrize("goes_on", [True, False])
-def test_a_vehicle_goes_on_while_its_odometry_stalls(goes_on):
-    mended, causes = with_odometry_mended(broken.odometry_freezes(WHOLE, MIDDLE, 5.0, goes_on), LIMITS)
-    assert causes[0].text.startswith("odometry stalled, and missed 1.")
-    assert_ends_as_the_whole(mended, causes[0])
 
 
 @pytest.mark.parametrize(("seconds", "is_mended"), [(20.0, True), (60.0, False)])
@@ -88,9 +83,16 @@ def test_what_poses_before_the_end_of_a_stall_were_taken_for_is_not_lost():
 
 
 @pytest.mark.parametrize(("recording", "is_measured"), [(TREMBLING, True), (WHOLE, False)])
-def test_a_vehicle_whose_measured_odometry_freezes_at_once_for_longer_goes_on_as_well(recording, is_measured):
-    _, causes = with_odometry_mended(broken.odometry_freezes(recording, MIDDLE, 20.0), LIMITS)
-    assert [cause.text[:29] for cause in causes] == ["odometry stalled, and missed "] * is_measured
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        (lambda recording: broken.odometry_freezes(recording, MIDDLE, 20.0), "odometry stalled, and missed "),
+        (lambda recording: rare.compass_sticks(recording, MIDDLE), "the compass stuck for "),
+    ],
+)
+def test_what_stands_for_long_is_a_fault_where_headings_are_measured(recording, is_measured, fault, said):
+    _, causes = with_odometry_mended(fault(recording), LIMITS)
+    assert [cause.text[: len(said)] for cause in causes] == [said] * is_measured
 
 
 @pytest.mark.parametrize("seconds", [3.0, 20.0])
@@ -123,8 +125,8 @@ def test_a_vehicle_that_stops_for_a_while_does_not_stall():
     seconds = WHOLE.track.times - START
     goes = 1.0 - np.clip(np.minimum(seconds - MIDDLE, MIDDLE + 11.0 - seconds) / 2.0, 0.0, 1.0)
     steps = broken.steps_of(WHOLE.track.poses) * goes[1:, np.newaxis]
-    poses = broken.integrated(WHOLE.track.poses[0], steps)
-    assert with_odometry_mended(WHOLE.with_track(Track(WHOLE.track.times, poses)), LIMITS)[1] == []
+    stopping = WHOLE.track.with_poses(broken.integrated(WHOLE.track.poses[0], steps))
+    assert with_odometry_mended(WHOLE.with_track(stopping), LIMITS)[1] == []
 
 
 def test_many_steps_are_one_cause():
@@ -151,13 +153,6 @@ def test_poses_that_are_told_again_and_again_are_left_out():
     assert np.abs(mended.track.at(times) - WHOLE.track.poses)[:-20].max() < 0.3
 
 
-def test_a_position_that_is_rounded_does_not_stall():
-    rounded = rare.odometry_rounded(broken.odometry_scaled(TREMBLING, 0.2), 0.1, 0.01)
-    mended, causes = with_odometry_mended(rounded, LIMITS)
-    assert mended is rounded
-    assert causes == []
-
-
 def test_positions_that_tremble_are_smoothed():
     mended, causes = with_odometry_mended(rare.odometry_noisy(WHOLE, 0.5), LIMITS)
     assert [cause.text for cause in causes] == ["reported positions tremble by about 0.5 m"]
@@ -165,19 +160,14 @@ def test_positions_that_tremble_are_smoothed():
     assert np.std(mended.track.poses[:, :2] - WHOLE.track.poses[:, :2]) < 0.2
 
 
-@pytest.mark.parametrize(("recording", "is_measured"), [(TREMBLING, True), (WHOLE, False)])
-def test_a_heading_that_stands_is_stuck_where_headings_are_measured(recording, is_measured):
-    _, causes = with_odometry_mended(rare.compass_sticks(recording, MIDDLE), LIMITS)
-    assert [cause.text[:19] for cause in causes] == ["the compass stuck f"] * is_measured
+NOISE = 0.02 * np.random.RandomState(0).normal(size=WHOLE.track.poses.shape)
+ROUNDED = rare.odometry_rounded(broken.odometry_scaled(TREMBLING, 0.2), 0.1, 0.01)
+NOISY = WHOLE.with_track(WHOLE.track.with_poses(WHOLE.track.poses + NOISE))
 
 
-@pytest.mark.parametrize("noise", [0.0, 0.02])
-def test_an_odometry_without_steps_stays_as_it_is(noise):
-    poses = WHOLE.track.poses + noise * np.random.RandomState(0).normal(size=WHOLE.track.poses.shape)
-    recording = WHOLE.with_track(Track(WHOLE.track.times, poses))
-    mended, causes = with_odometry_mended(recording, LIMITS)
-    assert mended is recording
-    assert causes == []
+@pytest.mark.parametrize("recording", [WHOLE, NOISY, ROUNDED], ids=["whole", "noisy", "rounded"])
+def test_an_odometry_without_steps_stays_as_it_is(recording):
+    assert with_odometry_mended(recording, LIMITS) == (recording, [])
 
 
 def test_a_gap_in_which_the_vehicle_went_on_is_no_step():

@@ -27,8 +27,8 @@ def stored():
     return map_of_bytes(map_bytes(localiser.stored("map", {"beam_width": 0.04}, 1.0, "run")))
 
 
-def restored(stored, same_odometry, **changes):
-    localiser = PARAMETERS.changed(changes).build_localiser()
+def restored(stored, same_odometry):
+    localiser = PARAMETERS.build_localiser()
     localiser.restore(stored, same_odometry)
     return localiser
 
@@ -61,20 +61,17 @@ def test_until_the_first_scan_the_stored_correction_is_shown(stored):
 
 
 def test_a_track_that_begins_after_the_restart_goes_straight_from_the_stored_place(stored):
-    localiser = restored(stored, same_odometry=True)
     end = StoredPlace.of_arrays(stored.arrays).belief.time
     track = Track(np.array([end + 8.0, end + 9.0]), np.array([[0.8, 0.4, 0.0], [0.9, 0.5, 0.0]]))
-    bridged = localiser.following.bridged(track)
+    bridged = restored(stored, same_odometry=True).following.bridged(track)
     np.testing.assert_allclose(bridged.at(end), drifting(4).reference_pose, atol=1e-9)
     np.testing.assert_array_equal(bridged.at(track.times), track.poses)
 
 
 @pytest.mark.parametrize(("same_odometry", "later"), [(True, 40.0), (True, -1.0), (False, 8.0)])
 def test_a_track_stays_as_it_is_where_the_stored_place_says_nothing_of_it(stored, same_odometry, later):
-    localiser = restored(stored, same_odometry)
-    end = StoredPlace.of_arrays(stored.arrays).belief.time
-    track = Track(np.array([end + later]), np.zeros((1, 3)))
-    assert localiser.following.bridged(track) is track
+    track = Track(StoredPlace.of_arrays(stored.arrays).belief.time + np.array([later]), np.zeros((1, 3)))
+    assert restored(stored, same_odometry).following.bridged(track) is track
 
 
 def test_another_odometry_is_found_anywhere_in_the_map(stored):
@@ -103,16 +100,12 @@ def test_a_place_is_confirmed_where_the_odometry_leads_to_the_next_one(aside, co
     assert found_place(100.0, place, odometry).leads_to(later, OdometryErrors()) == confirms
 
 
-def test_after_a_time_in_which_the_odometry_strays_far_the_next_scan_confirms_nothing(stored):
-    localiser = restored(stored, same_odometry=False)
-    updates = [localiser.take_scan(displaced(turn)).scan for turn in (0, 500)]
-    assert [update.accepted for update in updates] == [False, False]
-
-
-def test_a_lost_vehicle_does_not_write_into_the_map(stored):
+@pytest.mark.parametrize("scans", [[elsewhere(1)], [displaced(0), displaced(500)]], ids=["elsewhere", "too late"])
+def test_a_lost_vehicle_that_nothing_confirms_does_not_write_into_the_map(stored, scans):
+    """After a time in which the odometry strays far the next scan confirms nothing."""
     localiser = restored(stored, same_odometry=False)
     before = localiser.blocks.rows.copy()
-    assert not localiser.take_scan(elsewhere(1)).scan.accepted
+    assert not any(localiser.take_scan(scan).scan.accepted for scan in scans)
     np.testing.assert_array_equal(localiser.blocks.rows, before)
     assert localiser.is_lost
 
@@ -135,17 +128,13 @@ def test_a_map_without_a_matched_layer_is_matched_with_as_it_is_shown(stored):
 @pytest.mark.parametrize("name", ["T_map_odom", "time", "state", "covariance"])
 @pytest.mark.parametrize("value", [None, np.zeros(2), np.full((8, 8), np.nan)])
 def test_a_place_that_is_not_whole_is_none(stored, name, value):
-    arrays = {**stored.arrays, name: value}
-    if value is None:
-        del arrays[name]
+    arrays = {key: array for key, array in {**stored.arrays, name: value}.items() if array is not None}
     assert StoredPlace.of_arrays(arrays) is None
 
 
 def test_a_match_ends_the_search():
     search = PlaceSearch()
     search.expect()
-    search.learn(False)
-    search.learn(True)
-    for _ in range(5):
-        search.learn(False)
+    for accepted in (False, True, False, False, False, False):
+        search.learn(accepted)
     assert not search.is_lost
