@@ -79,11 +79,6 @@ class Line:
         self._port.close()
 
 
-def opened(name: str, baud_rate: int) -> Union[Datagrams, Line]:
-    """Open a connection; raises PortUnavailableError or PortRefusedError."""
-    return Datagrams(name) if name.startswith((_IN, _OUT)) else Line(name, baud_rate)
-
-
 class AutopilotLink:
     """Talks to one autopilot until it is closed, over a connection that may come and go.
 
@@ -158,8 +153,9 @@ class AutopilotLink:
             self._connection.close()
 
     def _try_to_open(self) -> Union[Datagrams, Line, None]:
+        name = self._parameters.connection
         try:
-            return opened(self._parameters.connection, self._parameters.baud_rate)
+            return Datagrams(name) if name.startswith((_IN, _OUT)) else Line(name, self._parameters.baud_rate)
         except PortUnavailableError as error:
             self._health.problem("attempts to open the connection", str(error))
             return None

@@ -22,11 +22,6 @@ def harmonics(angles: np.ndarray) -> np.ndarray:
     return np.column_stack([part(times * angles) for times in (1.0, 2.0) for part in (np.cos, np.sin)])
 
 
-def unwrapped(angle: float, near: float) -> float:
-    """Return the angle, plus or minus whole turns, that is nearest to `near`."""
-    return near + wrapped(angle - near)
-
-
 def grid(line: np.ndarray) -> np.ndarray:
     """Return the points (n, 2) of a square grid with sides `line`."""
     return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)

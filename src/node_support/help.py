@@ -17,7 +17,7 @@ from node_support.parameters import ParameterSet, describe
 
 # What the narrowest common terminal shows.
 WIDTH = 80
-_QUESTIONS = ("-h", "--help")
+
 _LINK = re.compile(r"\[([^]]*)\]\(([^)]*)\)")
 _NOTHING: Mapping[str, Type[ParameterSet]] = {}
 
@@ -72,7 +72,7 @@ def answer_help(
     parameters: those in the node's own namespace; None for a node that hosts others. groups: those in namespaces below
     it, by their names. tunable: whether dynamic_reconfigure can change parameters while the node runs.
     """
-    if any(argument in _QUESTIONS for argument in sys.argv[1:]):
+    if {"-h", "--help"} & {*sys.argv[1:]}:
         text = host_help(node) if parameters is None else node_help(node, {"": parameters, **groups}, tunable)
         write_help(text, sys.stdout)
         sys.exit(0)

@@ -40,16 +40,15 @@ class NodeDescription:
     hosted: Sequence[str] = ()
 
 
-def _interface(role: str, name: str, kind: str, text: str) -> Interface:
-    return Interface(Role(role), name.format_map(vars(topics)), kind, text)
-
-
 # The compiled loader, where PyYAML has it, reads the table in milliseconds.
 _TABLE = yaml.load(
     (package_folder() / "yaml/nodes.yaml").read_text(encoding="utf-8"), getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 )
 NODES: Dict[str, NodeDescription] = {
-    name: NodeDescription(row["summary"], tuple(_interface(*fields) for fields in row["interfaces"]))
+    name: NodeDescription(
+        row["summary"],
+        tuple(Interface(Role(role), topic.format_map(vars(topics)), *rest) for role, topic, *rest in row["interfaces"]),
+    )
     for name, row in _TABLE["nodes"].items()
 }
 HOSTS: Dict[str, NodeDescription] = {name: NodeDescription(**row) for name, row in _TABLE["hosts"].items()}

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any, Optional, Tuple, Union
 
 import numpy as np
 import rospy
-from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, Transform, TwistStamped, Vector3
+from geometry_msgs.msg import PoseWithCovarianceStamped, Quaternion, Transform, Twist, TwistStamped, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, Imu
 from std_msgs.msg import Header
@@ -28,7 +28,7 @@ from node_support.health import SILENCE
 from node_support.ros.callbacks import every, guarded, make_health
 from node_support.ros.node import DIAGNOSTICS_PERIOD, StartError
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.transforms import TfBuffer, matrix_from_message, pose_from_matrix
+from node_support.ros.transforms import TfBuffer, header, matrix_from_message, pose_from_matrix
 from sonar_driver.port import PortRefusedError
 from underwater_map_construction.msg import PositionStatus
 
@@ -50,15 +50,12 @@ class MavrosTopics:
 
     def send(self, pose: StatedPose) -> None:
         message = self._publisher.data_class()
-        message.header.stamp = rospy.Time(*divmod(pose.stamp_ns, 10**9))
-        message.header.frame_id = self._frames[0]
+        message.header = header(pose.stamp_ns, self._frames[0])
         message.pose.pose = pose_from_matrix(pose.T_enu_base)
         message.pose.covariance = pose.covariance.ravel().tolist()
         if isinstance(message, Odometry):
             message.child_frame_id = self._frames[1]
-            linear, angular = message.twist.twist.linear, message.twist.twist.angular
-            linear.x, linear.y, linear.z = pose.velocity
-            angular.x = angular.y = angular.z = np.nan
+            message.twist.twist = Twist(Vector3(*pose.velocity), Vector3(np.nan, np.nan, np.nan))
             message.twist.covariance[0] = np.nan
         self._publisher.publish(message)
 
@@ -97,26 +94,24 @@ class Instruments:
     def _header(self, boot_ms: int, offset_ns: Optional[int]) -> Header:
         stamp_ns = rospy.get_rostime().to_nsec() if offset_ns is None else boot_ms * 10**6 - offset_ns
         check_stamp(stamp_ns)
-        return Header(stamp=rospy.Time(*divmod(stamp_ns, 10**9)), frame_id=self._base_frame)
+        return header(stamp_ns, self._base_frame)
 
-    def _take_attitude(self, attitude: Any, header: Header) -> None:
+    def _take_attitude(self, attitude: Any, stamped: Header) -> None:
         self._orientation = rotation_of_attitude(attitude.roll, attitude.pitch, attitude.yaw)
-        imu = Imu(header=header, orientation=Quaternion(*quaternion_of(self._orientation)))
+        imu = Imu(header=stamped, orientation=Quaternion(*quaternion_of(self._orientation)))
         # Rates are the vehicle's own, ahead, right, down.
         imu.angular_velocity = Vector3(attitude.rollspeed, -attitude.pitchspeed, -attitude.yawspeed)
         imu.linear_acceleration_covariance[0] = -1.0  # not measured (sensor_msgs/Imu)
         self._headings.publish(imu)
 
-    def _take_pressure(self, pressure: Any, header: Header) -> None:
-        self._depths.publish(FluidPressure(header=header, fluid_pressure=pressure.press_abs * _PASCAL))
+    def _take_pressure(self, pressure: Any, stamped: Header) -> None:
+        self._depths.publish(FluidPressure(header=stamped, fluid_pressure=pressure.press_abs * _PASCAL))
 
-    def _take_velocity(self, local: Any, header: Header) -> None:
+    def _take_velocity(self, local: Any, stamped: Header) -> None:
         if self._orientation is None:
             raise RefusedInput("velocities refused", "LOCAL_POSITION_NED came before any ATTITUDE")
-        twist = TwistStamped(header=header)
         velocity = velocity_of_ned((local.vx, local.vy, local.vz), self._orientation)
-        twist.twist.linear = Vector3(*velocity)
-        self._velocities.publish(twist)
+        self._velocities.publish(TwistStamped(stamped, Twist(Vector3(*velocity), Vector3())))
 
 
 class AutopilotLinkNode:

@@ -6,7 +6,7 @@ from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import PoseWithCovarianceStamped, TransformStamped, Twist
+from geometry_msgs.msg import PoseWithCovarianceStamped, Transform, TransformStamped, Twist, Vector3
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import FluidPressure, Imu
 from std_msgs.msg import Float64
@@ -28,7 +28,7 @@ from node_support.errors import RefusedInput
 from node_support.headers import check_frame
 from node_support.ros.callbacks import MessageClasses, guarded, make_health
 from node_support.ros.reconfigurable_parameters import ReconfigurableParameters
-from node_support.ros.transforms import TfBuffer, pose_from_matrix, rotation_from_message
+from node_support.ros.transforms import TfBuffer, header, pose_from_matrix, rotation_from_message
 
 QUEUE_SIZE = 100  # a second of a fast AHRS
 _REFUSED_HEADINGS = "headings refused"
@@ -157,16 +157,12 @@ class DeadReckoning:
 
     def _publish(self, reckoning: Reckoning) -> None:
         parameters = self._live.current
-        transform = TransformStamped(child_frame_id=parameters.base_frame)
-        transform.header.stamp = rospy.Time(*divmod(reckoning.stamp_ns, 10**9))
-        transform.header.frame_id = parameters.odom_frame
+        stamped = header(reckoning.stamp_ns, parameters.odom_frame)
         pose = pose_from_matrix(reckoning.T_odom_base)
-        transform.transform.translation, transform.transform.rotation = pose.position, pose.orientation
-        self._broadcaster.sendTransform(transform)
-        odometry = Odometry(header=transform.header, child_frame_id=parameters.base_frame)
+        transform = Transform(pose.position, pose.orientation)
+        self._broadcaster.sendTransform(TransformStamped(stamped, parameters.base_frame, transform))
+        odometry = Odometry(header=stamped, child_frame_id=parameters.base_frame)
         odometry.pose.pose = pose
-        linear, angular = odometry.twist.twist.linear, odometry.twist.twist.angular
-        linear.x, linear.y, linear.z = reckoning.velocity
-        angular.z = reckoning.turn_rate
+        odometry.twist.twist = Twist(Vector3(*reckoning.velocity), Vector3(0.0, 0.0, reckoning.turn_rate))
         self._odometry.publish(odometry)
         self.health.count("transforms sent")

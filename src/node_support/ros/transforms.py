@@ -11,8 +11,9 @@ import genpy
 import numpy as np
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Pose, Quaternion, Transform, TransformStamped
+from geometry_msgs.msg import Point, Pose, Quaternion, Transform, TransformStamped
 from sensor_msgs.msg import JointState
+from std_msgs.msg import Header
 from tf2_msgs.msg import TFMessage
 
 from node_support import topics
@@ -257,10 +258,11 @@ def rotation_from_message(rotation: Quaternion, kind: str) -> np.ndarray:
 
 def pose_from_matrix(matrix: np.ndarray) -> Pose:
     """Return the pose message of a (4, 4) matrix."""
-    pose = Pose()
-    pose.position.x, pose.position.y, pose.position.z = matrix[:3, 3]
-    pose.orientation.x, pose.orientation.y, pose.orientation.z, pose.orientation.w = quaternion_of(matrix)
-    return pose
+    return Pose(Point(*matrix[:3, 3]), Quaternion(*quaternion_of(matrix)))
+
+
+def header(stamp_ns: int, frame_id: str) -> Header:
+    return Header(stamp=_time(int(stamp_ns)), frame_id=frame_id)
 
 
 def stamp_of(time: float) -> int:

@@ -8,7 +8,6 @@ from sensor_msgs.msg import PointCloud2
 from std_msgs.msg import Float32
 
 from node_support.errors import RefusedInput
-from node_support.headers import DAY
 from node_support.health import Health
 from node_support.ros.callbacks import guarded
 from node_support.ros.transforms import TfBuffer, stamp_of
@@ -105,7 +104,7 @@ _PATIENCE = 0.5  # s: transforms come at 2 Hz at least
 class SonarPlaces:
     """Remembers tf long enough for a slow scan."""
 
-    def __init__(self, sonar_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
+    def __init__(self, sonar_frame: str, health: Health, stamp_tolerance: float) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frame = sonar_frame
         self.transforms = TfBuffer(health, _CACHE, stamp_tolerance)

@@ -4,14 +4,13 @@ import math
 from functools import lru_cache
 from typing import List, Sequence, Tuple
 
-import genpy
 import numpy as np
 from rospy.numpy_msg import numpy_msg
 from sensor_msgs.msg import LaserScan, PointCloud2, PointField
-from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
 from node_support.headers import check_frame, check_point_stamps, check_stamp
+from node_support.ros.transforms import header
 from sonar_processing.cloud import Cloud
 from sonar_processing.scans.polar_scan import PlanarLaserScan
 from underwater_map_construction.msg import StampedIntensityCloud
@@ -24,10 +23,6 @@ LaserScanArrays = numpy_msg(LaserScan)
 
 POINT_FIELDS = ("x", "y", "z", "intensity")
 _FLOAT_BYTES = 4  # Of a FLOAT32 in a PointCloud2
-
-
-def header(stamp_ns: int, frame_id: str) -> Header:
-    return Header(stamp=genpy.Time(*divmod(int(stamp_ns), 10**9)), frame_id=frame_id)
 
 
 def cloud_from_message(message: StampedIntensityCloud) -> Cloud:

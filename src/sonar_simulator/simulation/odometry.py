@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from node_support.geometry import pose_matrix, rotated, unwrapped, yaw_of
+from node_support.geometry import pose_matrix, rotated, wrapped, yaw_of
 from node_support.parameters import ParameterSet, parameter
 from sonar_simulator.simulation.scripted_vehicle import VehicleState
 
@@ -80,7 +80,8 @@ class Odometry:
         self._noise = keep * self._noise + math.sqrt(1.0 - keep**2) * self._rng.standard_normal(3)
         turned = self._turn_rate_error(state) * duration
         yaw = yaw_of(state.T_world_base)
-        middle = 0.5 * (yaw_of(self._true) + unwrapped(yaw, yaw_of(self._true)))
+        before = yaw_of(self._true)
+        middle = 0.5 * (before + (before + wrapped(yaw - before)))
         moved = rotated(state.T_world_base[:2, 3] - self._true[:2, 3], -middle)
         measured = moved * self._scale * (1.0 + self._parameters.speed_noise * self._noise[:2])
         self._position = self._position + rotated(measured, middle + self._heading_error + 0.5 * turned)
