@@ -79,7 +79,8 @@ class ShapeDetectorNode(ABC):
         self.health.count(f"{self.what} out", len(shapes))
         self._coefficients.publish(coefficients)
         self._markers.publish(markers)
-        self._inliers.publish(_part(cloud, shapes))
+        members = np.concatenate([np.zeros(0, dtype=np.int64), *(shape.members for shape in shapes)])
+        self._inliers.publish(cloud.take(np.unique(members)))
 
 
 class LineDetectorNode(ShapeDetectorNode):
@@ -109,11 +110,6 @@ class CircleDetectorNode(ShapeDetectorNode):
         circles = self._detector(cloud, lambda times: self._places.at(cloud.frame_id, times))
         message = circles_message(cloud, circles)
         return circles, message, circle_markers(message)
-
-
-def _part(cloud: Cloud, shapes: Sequence[Any]) -> Cloud:
-    members = np.concatenate([np.zeros(0, dtype=np.int64), *(shape.members for shape in shapes)])
-    return cloud.take(np.unique(members))
 
 
 DETECTORS = {kind.name: kind for kind in (LineDetectorNode, CircleDetectorNode)}

@@ -128,18 +128,12 @@ def test_a_transform_that_was_overtaken_forgets_nothing(tf):
 @pytest.mark.parametrize(
     "bad",
     [
-        transform(CLOCK, x=math.nan),
-        transform(CLOCK, x=math.inf),
-        transform(CLOCK, w=0.0),
-        transform(CLOCK, w=math.nan),
-        transform(CLOCK, child=""),
-        transform(CLOCK, child="odom"),
-        transform(CLOCK, child="base\0link"),
-        transform(CLOCK, parent=""),
+        *({"x": math.nan}, {"x": math.inf}, {"w": 0.0}, {"w": math.nan}),
+        *({"child": ""}, {"child": "odom"}, {"child": "base\0link"}, {"parent": ""}),
     ],
 )
 def test_a_transform_that_tf2_cannot_take_is_counted_and_the_next_of_its_message_is_taken(tf, bad):
-    tf.send(bad, transform(CLOCK, x=2.0))
+    tf.send(transform(CLOCK, **bad), transform(CLOCK, x=2.0))
     assert tf.refused == 1
     assert tf.x(CLOCK) == 2.0
 
