@@ -78,7 +78,8 @@ def enu_of_map(azimuth_deg: float) -> np.ndarray:
 def full_covariance(planar: np.ndarray, parameters: AutopilotLinkParameters) -> np.ndarray:
     """Return the covariance (6, 6) east, north, up for that of x, y and yaw in the map (3, 3).
 
-    z, roll and pitch, which others measure, are stated too: ArduPilot takes one deviation for x, y and z together.
+    z, roll and pitch are measured by others than us: leaving them unknown would make ArduPilot, which takes one
+    deviation for x, y and z together, believe nothing.
     """
     turn = enu_of_map(parameters.map_azimuth_deg)[:3, :3]
     tilt = math.radians(parameters.tilt_deviation_deg) ** 2
@@ -88,7 +89,10 @@ def full_covariance(planar: np.ndarray, parameters: AutopilotLinkParameters) -> 
 
 
 def velocity_between(T_before: np.ndarray, T_now: np.ndarray, seconds: float) -> np.ndarray:
-    """Return (3,) m/s along the axes of a vehicle between two poses (4, 4), NaN where these are too far apart."""
+    """Return (3,) m/s along the axes of a vehicle that went from one pose (4, 4) to the other.
+
+    NaN, which stands for unknown, where they are too far apart in time, or in space as after a restart of the odometry.
+    """
     moved = T_now[:3, 3] - T_before[:3, 3]
     if not 0.0 < seconds <= _LONGEST_STEP or np.linalg.norm(moved) > _FASTEST * seconds:
         return np.full(3, np.nan)

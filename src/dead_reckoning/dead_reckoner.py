@@ -143,7 +143,10 @@ class DeadReckoner:
         self._position[2] = -depth
 
     def take_orientation(self, stamp_ns: int, rotation: np.ndarray) -> Reckoning:
-        """Return where the vehicle is at an orientation R_odom_base (3, 3); raises RefusedInput for one not newer."""
+        """Take the vehicle's orientation R_odom_base (3, 3) and return where the vehicle is then.
+
+        Raises RefusedInput for one that is not newer than the last.
+        """
         if self._stamp_ns is not None and stamp_ns < self._stamp_ns - JUMP_BACK * 1e9:
             self.clear()
         if self._stamp_ns is not None and stamp_ns <= self._stamp_ns:
@@ -177,13 +180,17 @@ class DeadReckoner:
 
 
 def depth_of_pressure(pressure: float, surface_pressure: float, density: float) -> float:
-    """Return the depth [m] at which water of one density [kg/m^3] has an absolute `pressure` [Pa]."""
+    """Return the depth [m] below the surface where the water's absolute pressure is `pressure` [Pa].
+
+    density: of the water, kg/m^3, taken to be the same at all depths.
+    """
     return (pressure - surface_pressure) / (density * STANDARD_GRAVITY)
 
 
 def rotation_of_heading(heading: float, kind: HeadingType) -> np.ndarray:
-    """Return R_odom_base (3, 3), x east and z up, of a level vehicle; heading: clockwise from north, as `kind` says.
+    """Return R_odom_base (3, 3), x east and z up, of a level vehicle.
 
+    heading: clockwise from north, in degrees or radians as `kind` says.
     Raises RefusedInput for a heading that is not finite, or of more than two turns.
     """
     radians = math.radians(heading) if kind is HeadingType.COMPASS_DEGREES else heading

@@ -26,7 +26,10 @@ def write_whole(path: Path, data: bytes) -> None:
 
 
 def check_output(path: Path, inputs: Iterable[Path], overwrite: bool, ending: str = "") -> None:
-    """Raise OSError unless `path` ends with `ending`, is none of `inputs`, and is new where not to `overwrite`."""
+    """Raise OSError unless a program that reads `inputs` may write `path`: a new file, an old one with `overwrite`.
+
+    ending: that the file's name must have.
+    """
     if not path.name.endswith(ending):
         raise OSError(errno.EINVAL, f"must end with {ending}", str(path))
     if any(path.exists() and one.exists() and path.samefile(one) for one in inputs):

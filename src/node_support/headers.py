@@ -10,8 +10,9 @@ from node_support.parameters import ParameterSet, parameter
 
 STAMPS_REFUSED = "stamps refused"
 
-DAY = 86400.0  # s: a clock that is wrong by more has never been set
-JUMP_BACK = 1.0  # s: time jumped, as when a bag loops, where stamps go back by more; messages overtake others by less
+DAY = 86400.0  # s: a clock that is wrong by more than a day has never been set
+# s: stamps that go back by more mean that time jumped, as when a bag loops; messages overtake each other by less.
+JUMP_BACK = 1.0
 _NANOSECONDS = 10**9
 # tf2 takes stamps as float64 seconds, which may round up, and subtracts and returns them as signed 32 bit numbers;
 # from 2^31 s on it ends the process.
@@ -55,7 +56,10 @@ def check_stamp(stamp_ns: int, references_ns: Iterable[int] = (), tolerance: flo
 
 
 def check_point_stamps(stamps: np.ndarray, stamp_ns: int) -> None:
-    """Raise RefusedInput where a finite time [s] of a point (n,), signs left out, is over a day from its cloud's."""
+    """Raise RefusedInput unless the times [s] of points, signs left out, are within a day of their cloud's.
+
+    stamps: (n,) float64; those that are not finite belong to points that are left out, and pass.
+    """
     distances = np.abs(np.abs(stamps[np.isfinite(stamps)]) - stamp_ns / _NANOSECONDS)
     wrong = np.count_nonzero(distances > DAY)
     if wrong:

@@ -46,7 +46,10 @@ class _Input:
         self._newest, self._is_expected = now, False
 
     def silence(self, now: float) -> float:
-        """Return how long [s] it is silent; 0 while it comes as usual, and before it came twice if not expected."""
+        """Return for how long [s] it has been silent; 0 while it comes as usual, and before it came twice.
+
+        One that is expected from the beginning is silent before, too.
+        """
         seconds = now - self._newest
         return seconds if seconds > SILENCE and (self._is_expected or self._usual.overdue(now) > 0.0) else 0.0
 
@@ -128,7 +131,10 @@ class Health:
             self._values[what] = value
 
     def problem(self, kind: str, detail: str, number: int = 1, level: Level = Level.WARN) -> None:
-        """Count `number` problems of a kind, which give the stage a level for a while, and warn now and then."""
+        """Count `number` problems of a kind and warn with the newest detail once in a while.
+
+        level: that the stage has while the problem is recent.
+        """
         with self._lock:
             problem = self._counted(kind, detail, number)
             problem.level = level

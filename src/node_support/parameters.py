@@ -97,15 +97,19 @@ class ParameterSet:
 
     @classmethod
     def from_mapping(cls: Type[Self], values: Mapping[str, Any]) -> Self:
-        """Build from plain values, else defaults; raises ParameterError for an unknown key or a value not allowed."""
+        """Build from plain values (yaml, parameter server); keys that are left out keep their defaults.
+
+        Raises ParameterError for an unknown key or a value that is not allowed.
+        """
         return cls(**cls.by_name(values)[0])
 
     @classmethod
     def by_name(cls, values: Mapping[str, Any]) -> Tuple[Dict[str, Any], List[str]]:
         """Return plain values by the names of the parameters, and a remark on each key or value of an older version.
 
-        A key beside `expert` goes before the same one under it, and an older name before the newer one, which default
-        files hold. Raises ParameterError for a key that never was a parameter.
+        A key beside `expert` goes before the same one under it, and an older name before the newer one: whoever gives
+        them wants something else than the default files, which hold the others. Raises ParameterError for a key that
+        never was a parameter.
         """
         known = [field.name for field in dataclasses.fields(cls)]
         experts = values.get(EXPERT, {})
@@ -260,7 +264,10 @@ def read_values(path: Path) -> Dict[str, Any]:
 
 
 def assigned_values(texts: Iterable[str]) -> Dict[str, Any]:
-    """Return the values, read as yaml, of texts KEY=VALUE; the last one of a key counts. Raises ParameterError."""
+    """Return the values of texts KEY=VALUE, which are yaml, by their keys; the last one of a key counts.
+
+    Raises ParameterError for a text without key, without = or whose value is no yaml.
+    """
     values = {}
     for text in texts:
         key, equals, value = text.partition("=")

@@ -46,6 +46,7 @@ class MavrosTopics:
             self._publisher = rospy.Publisher(topics.MAVROS_POSE, PoseWithCovarianceStamped, queue_size=10)
 
     def obstacle(self) -> str:
+        """Return why no position can be sent now; empty when one can."""
         return "" if self._publisher.get_num_connections() else f"nobody listens to {self._publisher.resolved_name}"
 
     def send(self, pose: StatedPose) -> None:

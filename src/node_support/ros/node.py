@@ -152,9 +152,10 @@ class _ImpatientTransport(xmlrpc.client.Transport):
 class MasterWatch:
     """Asks the master every `MASTER_PERIOD` seconds whether it knows this node.
 
-    A master that gives no answer may only be away for a while. A new one, which does not know the node, has neither its
-    topics nor its parameters: nobody will ever connect to the node again. It may know the node's name all the same, for
-    rospy asks it for a parameter with each log line: then its process number tells.
+    A master that gives no answer may only be away for a while, and the node runs on. A new master, which answers that
+    it does not know the node, has neither its topics nor its parameters: nobody will ever connect to the node again.
+    It may know the node's name all the same, for rospy asks it for a parameter with each log line: then its process
+    number tells.
     """
 
     def __init__(self) -> None:
@@ -200,7 +201,8 @@ _ARENAS = 2
 def hold_little() -> None:
     """Give large arrays memory of their own, which goes back when they do, and let threads share what is left.
 
-    glibc would hold several times what a node uses: a heap for each thread, with holes where large arrays were.
+    A node makes arrays of all sizes for hours and keeps a few. glibc would hold several times what it uses: a heap for
+    each thread, with holes where large arrays were.
     """
     set_option = getattr(ctypes.CDLL(None), "mallopt", None)
     if set_option is not None:

@@ -110,7 +110,10 @@ class TfBuffer:
         return self._looked_up(target, source, _time(stamp_ns))[1]
 
     def newest(self, target: str, source: str) -> Optional[Tuple[int, np.ndarray]]:
-        """Return the newest stamp [ns], 0 where nothing changes, and T_target_source (4, 4); None when tf has none."""
+        """Return the newest stamp [ns] and (4, 4) T_target_source; None when tf knows none.
+
+        The stamp is 0 where nothing between the frames changes.
+        """
         try:
             return self._looked_up(target, source, genpy.Time(0))
         except RefusedInput:
@@ -266,7 +269,10 @@ def header(stamp_ns: int, frame_id: str) -> Header:
 
 
 def stamp_of(time: float) -> int:
-    """Return the stamp [ns] at which to ask for a rounded time [s]: a microsecond earlier, for tf's newest pose."""
+    """Return the stamp [ns] at which to ask for a time [s].
+
+    Seconds in a float are rounded; a microsecond earlier, tf's newest pose can be asked for at its own time.
+    """
     return max(round((time - _ROUNDING) * 1e9), 1)
 
 

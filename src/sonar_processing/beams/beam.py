@@ -16,7 +16,8 @@ FARTHEST_RANGE = 10_000.0
 _MOST_ANGLE = 1e6  # rad: more turns than any head counts; a broken message has up to 1e308
 SERVO_DEAD_BAND = 1e-3  # rad: a servo that holds its place trembles by less, and none steps by as little
 _ROUNDING = 1e-4  # Share: of a length of bins that was computed from float32
-_LONGEST_NS = 10 * 10**9  # Longer than any head takes for some beams, shorter than a slow turn
+# Longer than any head takes for some beams, shorter than a slow turn: the vehicle is elsewhere by then.
+_LONGEST_NS = 10 * 10**9
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,7 @@ class PlacedBeam:
     is_moving: bool
 
     def turned(self, angle: float) -> "PlacedBeam":
-        """Return the beam of a sonar that is turned by `angle` [rad] about the target frame's z, where it is."""
+        """Return the beam of a sonar that is turned by `angle` [rad] more about the target frame's z, where it is."""
         T_turned = self.T_target_sonar.copy()
         T_turned[:3, :3] = pose_matrix((0.0, 0.0, 0.0), (0.0, 0.0, angle))[:3, :3] @ self.T_target_sonar[:3, :3]
         return replace(self, T_target_sonar=T_turned)
@@ -105,8 +106,9 @@ def project_beams(
 ) -> np.ndarray:
     """Return (n, dispersed_points * bins, 4) float32: x y z [m] in the target frame and echo strength, of n beams.
 
-    Every bin is drawn as `dispersed_points` points across the horizontal `beam_width` [rad], one alone on the beam's
-    axis; they come ordered by side, then by range. All beams have the same ranges. T_target_sonar: (n, 4, 4).
+    Every bin is drawn as `dispersed_points` points side by side across the horizontal `beam_width` [rad]; one point
+    lies on the beam's axis. The points of a beam come ordered by side, then by range. The beams have the same ranges;
+    T_target_sonar is (n, 4, 4).
     """
     angles = np.array([beam.angle for beam in beams])
     half_width = beam_width / 2.0 if dispersed_points > 1 else 0.0

@@ -66,7 +66,10 @@ _PIXELS = {0: np.dtype("u1"), 2: np.dtype("u2"), 4: np.dtype("u4")}  # DTYPE_ of
 
 
 def raw_sonar_image(message: Any) -> List[BeamFields]:
-    """Read a RawSonarImage of marine_acoustic_msgs, whose angle is a turn about the axis that points up."""
+    """Read a RawSonarImage of marine_acoustic_msgs; raises RefusedInput for one of several beams.
+
+    Its samples count from `sample0` on; the angle is a turn about the axis that points up.
+    """
     strengths, speed = _only_beam(message.image), speed_of_sound_of(message.ping_info.sound_speed)
     padded = np.pad(strengths, (message.sample0, 0), mode="constant")
     resolution = speed / (2.0 * message.sample_rate)
@@ -74,7 +77,10 @@ def raw_sonar_image(message: Any) -> List[BeamFields]:
 
 
 def projected_sonar_image(message: Any) -> List[BeamFields]:
-    """Read a ProjectedSonarImage of marine_acoustic_msgs, whose directions have x up, y to the right and z ahead."""
+    """Read a ProjectedSonarImage of marine_acoustic_msgs; raises RefusedInput for one of several beams.
+
+    Its directions have x up, y to the right and z ahead.
+    """
     strengths = _only_beam(message.image)
     resolution = length_of_bins(message.ranges, strengths.size)
     padded = np.pad(strengths, (max(round(message.ranges[0] / resolution - 0.5), 0), 0), mode="constant")

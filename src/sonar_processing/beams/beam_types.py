@@ -1,8 +1,7 @@
 """What the messages of different sonars say of their beams. A new type needs one function here and one table entry.
 
 The functions take any object with the fields of the message: one of rospy, of rosbags or of a test. They raise
-AttributeError for a field that is missing, TypeError or ValueError for one that holds something else, RefusedInput for
-what makes no beam of a scanning sonar.
+AttributeError for a field that is missing, TypeError or ValueError for one that holds something else.
 """
 
 import math
@@ -34,7 +33,8 @@ OWN = "underwater_map_construction/SonarScanLine"
 LASER_SCAN = "sensor_msgs/LaserScan"
 POINT_CLOUD = "sensor_msgs/PointCloud"
 IMAGE = "sensor_msgs/Image"
-UNLIKELY = (IMAGE, LASER_SCAN)  # beams of a scanning sonar where somebody says so, else of cameras and rangefinders
+# Types that hold beams of a scanning sonar where somebody says so, and else what cameras and rangefinders send.
+UNLIKELY = (IMAGE, LASER_SCAN)
 _STRAIGHT = 0.01  # Of a bin: so far points of one beam lie beside their line, by rounding
 
 
@@ -63,7 +63,7 @@ class RadiansOrGradians:
 
     def __init__(self) -> None:
         self._votes: Deque[bool] = deque(maxlen=_VOTES)
-        self.unit: Optional[AngleUnit] = None  # before any angle said something
+        self.unit: Optional[AngleUnit] = None  # None before any angle said something
 
     def take(self, angle: float) -> None:
         """Take one more angle; one that is 0 or not finite says nothing."""
@@ -76,7 +76,7 @@ class RadiansOrGradians:
 
 
 def sonar_scan_line(message: Any) -> List[BeamFields]:
-    """Read a SonarScanLine."""
+    """Read a SonarScanLine; raises RefusedInput when its range is not positive."""
     if not message.maxrange_meters > 0.0:
         raise RefusedInput(
             "beams refused", f"maxrange_meters {message.maxrange_meters}, must be above 0 m; check the driver"
@@ -106,7 +106,10 @@ def scan_line(message: Any) -> List[BeamFields]:
 
 
 def point_cloud(message: Any) -> List[BeamFields]:
-    """Read a PointCloud of tritech_micron: one beam, whose bin i ends at its point i."""
+    """Read a PointCloud of tritech_micron: one beam, whose bin i ends at its point i.
+
+    Raises RefusedInput for points that are not those of one beam.
+    """
     points = np.array([(one.x, one.y, one.z) for one in message.points], dtype=np.float64).reshape(-1, 3)
     strengths = message.channels[0].values if message.channels else ()
     if len(points) < 2 or len(strengths) != len(points):
@@ -120,9 +123,10 @@ def point_cloud(message: Any) -> List[BeamFields]:
 
 
 def laser_scan(message: Any) -> List[BeamFields]:
-    """Read a LaserScan: a beam for each ray, timed as `time_increment` says, with one echo where the ray has a range.
+    """Read a LaserScan: one beam with one echo for each ray; raises RefusedInput for one without range or direction.
 
-    Rays that all point one way are the bins of one beam with their intensities, as in the Girona caves data set.
+    Rays are timed as `time_increment` says. A ray without a range becomes a beam without echoes. Rays that all point
+    one way are the bins of one beam, whose strengths are their intensities, as in the Girona caves data set.
     """
     if len(message.ranges) > 1 and message.angle_increment == 0.0:
         resolution = length_of_bins(message.ranges, len(message.intensities))

@@ -134,7 +134,10 @@ class HeadWatch:
         return abs(self._swept) > FULL_TURN + 2.0 * self._step
 
     def _sector_differs(self, angle: float) -> bool:
-        """Return whether a sweep to `angle` follows whole turns, or ends elsewhere than the one before the last."""
+        """Return whether a sweep that ends at `angle` is none of the sector so far.
+
+        That is one after whole turns, or one that ends elsewhere than the one before last, which went the same way.
+        """
         known = len(self._ends) == self._ends.maxlen
         differs = known and abs(wrapped(angle - self._ends[0])) > 1.5 * self._step
         differs = differs or self._is_beyond_a_turn

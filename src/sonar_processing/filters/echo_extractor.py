@@ -73,6 +73,7 @@ class EchoExtractorParameters(ParameterSet):
 
     @property
     def is_settled(self) -> bool:
+        """Whether nothing is left to be found out from the echoes."""
         return self.mode is not ExtractionMode.AUTO and self.pulse_sigma > 0.0
 
     def settled(self, heard: EchoStatistics) -> "EchoExtractorParameters":
@@ -137,8 +138,9 @@ def ring_of(smooth: np.ndarray, quantile: float, sigma: float) -> Tuple[np.ndarr
 
 
 def _hearing(smooth: np.ndarray) -> np.ndarray:
-    """Return the beams (k, bins) that hear a background and so may tell of a ring; all where there is none or too few
-    do. Others lie behind the hull.
+    """Return the beams (k, bins) that hear a background; all of them in a scan without one, or where too few do.
+
+    The others, as those behind the hull, do not tell whether there is a ring.
     """
     background = np.quantile(smooth, _BACKGROUND, axis=1)
     loud = np.quantile(background, _LOUD)
@@ -197,7 +199,10 @@ class EchoExtractor:
 
 
 def bin_length(rows: np.ndarray) -> float:
-    """Return the distance [m] of neighbouring bins of an organised cloud (beams, bins, 4); raises RefusedInput."""
+    """Return the distance between neighbouring bins of an organised cloud (beams, bins, 4), m.
+
+    Raises RefusedInput when no two neighbours are left to tell it from.
+    """
     some = rows[:: max(len(rows) // _ROWS_MEASURED, 1), :, :3]
     lengths = np.linalg.norm(np.diff(some, axis=1), axis=2)
     lengths = lengths[np.isfinite(lengths)]
@@ -218,7 +223,10 @@ def width_of(rows: np.ndarray) -> float:
 
 
 def places(rows: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
-    """Return (n, 4) float32: the points between the bins of an organised cloud (beams, bins, 4), or along the beam."""
+    """Return (n, 4) float32: the points between the bins of an organised cloud (beams, bins, 4).
+
+    Bins before the first or after the last lie on the continued beam.
+    """
     lower = np.clip(np.floor(bins).astype(np.int64), 0, max(rows.shape[1] - 2, 0))
     upper = np.minimum(lower + 1, rows.shape[1] - 1)
     share = (bins - lower).astype(np.float32)[:, np.newaxis]

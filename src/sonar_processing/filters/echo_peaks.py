@@ -132,7 +132,10 @@ def _level_tops(image: np.ndarray) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 
 def _summit(image: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarray:
-    """Return where, -0.5 to 0.5 bins, the parabola through a peak and its neighbours, 0 beyond the ends, is highest."""
+    """Return where between -0.5 and 0.5 bins the parabola through a peak and its neighbours is highest.
+
+    Beyond the first and the last bin nothing is heard.
+    """
     end = image.shape[1] - 1
     top = image[beams, bins]
     left = np.where(bins > 0, image[beams, np.maximum(bins - 1, 0)], 0.0)
@@ -144,7 +147,10 @@ def _summit(image: np.ndarray, beams: np.ndarray, bins: np.ndarray) -> np.ndarra
 
 
 def leading_edges(image: np.ndarray, peaks: Peaks) -> Peaks:
-    """Return where the echo of each peak of an image (beams, bins) rises through half of the height of its highest."""
+    """Return where each peak's echo rises through half of the peak's height; one place per echo, its highest peak.
+
+    image: (beams, bins) float32, in which the peaks were found.
+    """
     bins = np.rint(peaks.bins).astype(np.int64)
     half = peaks.heights / 2.0
     walking = np.arange(len(bins))

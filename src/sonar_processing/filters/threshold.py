@@ -49,7 +49,8 @@ class Thresholder:
         from sonar_processing.filters import compiled_strengths
 
         self._loops = compiled_strengths
-        self.newest_threshold: Optional[float] = None  # before the first cloud and for one without a finite point
+        # Of the newest cloud; None before the first and for a cloud without a finite point.
+        self.newest_threshold: Optional[float] = None
 
     def __call__(self, cloud: Cloud) -> Cloud:
         """Return the cloud's strong points; a cloud without a finite point comes back without points.

@@ -110,7 +110,10 @@ class SonarPlaces:
         self.transforms = TfBuffer(health, _CACHE, stamp_tolerance)
 
     def poses(self, frame_id: str, times: np.ndarray) -> np.ndarray:
-        """Return SonarPoses, after up to half a second for the newest; raises RefusedInput when tf knows none."""
+        """Return T_frame_sonar (m, 4, 4) in `frame_id` at `times` (m,) [s], NaN where tf does not know it.
+
+        Waits up to half a second for the newest. Raises RefusedInput when tf knows none of them.
+        """
         distinct, index = np.unique(times, return_inverse=True)
         stamps = [stamp_of(seconds) for seconds in distinct]
         reason = self.transforms.wait_for(frame_id, self._frame, stamps[-1], _PATIENCE)

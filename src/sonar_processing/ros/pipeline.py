@@ -54,6 +54,7 @@ class StageRunner:
 
     @classmethod
     def as_node(cls, name: str) -> "StageRunner":
+        """Return the stage `name` as a node of its own, which takes clouds from its input topic."""
         runner = cls(name, "~")
         for topic in runner.type.outputs:
             subscribe_to_clouds(topic, partial(runner.process, topic), runner.health)

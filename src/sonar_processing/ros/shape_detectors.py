@@ -48,11 +48,13 @@ class ShapeDetectorNode(ABC):
 
     @classmethod
     def as_node(cls) -> "ShapeDetectorNode":
+        """Return the detector as a node of its own, which takes clouds from its input topic."""
         detector = cls()
         subscribe_to_clouds(cls.input_topic, detector.process, detector.health)
         return detector
 
     def sink(self) -> CloudSink:
+        """Return where the process that hosts the detector hands its clouds to."""
         return CloudSink(DetectorQueue(self).take, lambda: self.is_read)
 
     @property

@@ -120,6 +120,7 @@ class TransformFilter:
         self._notify()
 
     def make_room(self, beams: int) -> None:
+        """Let so many beams wait that come at once: those of a whole turn in one message."""
         with self._lock:
             self._queue.make_room(beams)
 

@@ -50,9 +50,10 @@ class ScanAssembler:
     def add(self, placed: PlacedBeam) -> Optional[Cloud]:
         """Add a beam; return the scan that it completes, or None.
 
-        A scan ends after `scan_size` beams or when the next beam is expected where the scan began; it ends before a
-        beam that finds the servo moved or the last beams of a turn lost. In the continuous modes every beam returns the
-        newest `scan_size` beams, once there are as many. A long silence of the head makes an unfinished scan forgotten.
+        A scan ends after `scan_size` beams or when the next beam is expected where the scan began. It also ends when
+        the servo moved or when the last beams of a turn were lost: then the new beam belongs to the next scan. In the
+        continuous modes every beam returns the newest `scan_size` beams, once there are as many. An unfinished scan
+        before a long silence of the head is forgotten: it would come long after its time.
         """
         beam, finished = placed.beam, None
         if self._last is not None and long_after(beam, self._last):
@@ -197,10 +198,14 @@ class MovingState:
         self.was_heard, self._since_ns = True, None
 
     def is_moving(self, parameters: SonarToCloudParameters) -> bool:
+        """Whether the vehicle is faster than the dead band; without any velocity it is still."""
         return self._speed > parameters.still_speed or self._turn_rate > parameters.still_turn_rate
 
     def age(self, stamp_ns: int) -> float:
-        """Return the seconds from the first beam after the newest velocity, or a jump back of time, to `stamp_ns`."""
+        """Return the seconds between the first beam after the newest velocity and a beam of `stamp_ns`.
+
+        Counted from anew when time jumps back.
+        """
         if self._since_ns is None or stamp_ns < self._since_ns:
             self._since_ns = stamp_ns
         return (stamp_ns - self._since_ns) * 1e-9

@@ -59,7 +59,10 @@ class PolarImage:
         return self._canvas.metres_per_pixel
 
     def draw(self, beam: Beam) -> np.ndarray:
-        """Return the picture (side, side) uint8 with a beam, which the next one changes; raises RefusedInput."""
+        """Draw a beam; return the picture (side, side) uint8, which the next beam will change.
+
+        Raises RefusedInput when the picture would have more than `MOST_PIXELS` pixels in a row.
+        """
         length = (beam.intensities.size, beam.range_resolution)
         if self._canvas is None or self._drawn_for != length:
             self._canvas = _canvas(*length, self.parameters.metres_per_pixel)

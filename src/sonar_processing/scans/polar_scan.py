@@ -128,9 +128,10 @@ class PlanarLaserScan:
 
 
 def planar_laser_scan(scan: PolarScan, parameters: SonarToCloudParameters) -> PlanarLaserScan:
-    """Return the scan as rays around the sonar's pose at its newest beam, to which the vehicle's motion is undone.
+    """Return the scan as rays around the sonar's pose at its newest beam.
 
-    Of several echoes in one ray the nearest stays. Beams may come in any direction.
+    A turn takes seconds and the vehicle moves meanwhile. Each beam's echo is therefore placed by the beam's own pose,
+    and seen from the newest one; of several echoes in one ray the nearest stays. Beams may come in any direction.
     """
     picked, found = picked_bins(scan.strengths, scan.kept(parameters), parameters)
     beams = np.flatnonzero(found)
@@ -156,8 +157,10 @@ def usual_rays(angles: np.ndarray) -> int:
 
 
 def turn_cloud(scan: PolarScan, parameters: SonarToCloudParameters) -> np.ndarray:
-    """Return (n, 5) float32, the columns `TURN_FIELDS`: all kept bins, placed by the poses of their own beams and seen
-    from that of the newest, after which times are counted [s], never above 0.
+    """Return (n, 5) float32, the columns `TURN_FIELDS`: all kept bins, seen from the newest beam's pose.
+
+    Each bin is placed by the pose of its own beam, so that the vehicle's motion no longer bends the turn. Times are in
+    s after the newest beam, and so never above 0.
     """
     beams, bins = np.nonzero(scan.kept(parameters))
     seconds = np.abs(scan.time_stamps)

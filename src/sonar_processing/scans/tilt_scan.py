@@ -59,7 +59,10 @@ class State(Enum):
 
 
 class TiltScan:
-    """Decides when the servo moves, from joint angles [rad], beams and time [s]; `command` receives the goals [rad]."""
+    """Decides when the servo moves, from joint angles, beams and time; `command` receives the goals.
+
+    Times are in s, angles in rad.
+    """
 
     def __init__(
         self, parameters: SonarControlParameters, time: float, command: Callable[[float], None], health: Health

@@ -25,11 +25,18 @@ from sonar_processing.shapes.ransac import RansacParameters, best_hypothesis
 
 # Returns the sonar's place (m, 2) x y [m], in the cloud's frame, at times (m,) [s], NaN where it is not known.
 SonarPositions = Callable[[np.ndarray], np.ndarray]
-_NEXT_BEAM = 1.5  # times as far as the beams are apart: there the next beam meets a wall that is not in line with them
-_PENALTY = 4  # echoes on a circle that one too near to it outweighs: more than beams that a small thing fills
-_LINE_ECHOES = 6  # from which on the better fit decides: fewer that graze a buoy lie as nearly on a line as on a circle
-_HOLLOW = 0.25  # m: echoes of a near side bulge towards the sonar; noise and motion make them as hollow, niches more
-_RADII_PER_PAIR = 100  # hypotheses of a pair of echoes: more tell nothing new
+# The next beam of a wall meets it at most so many times as far away as the last one, unless the wall is nearly in line
+# with the beams.
+_NEXT_BEAM = 1.5
+_PENALTY = 4  # One echo too near to a circle outweighs so many on it: more than beams that a small thing fills
+# Echoes that graze a buoy at 10 m lie as nearly on a line as on the circle, five of them where a turning vehicle sees
+# it twice; from six on the better fit decides.
+_LINE_ECHOES = 6
+# Echoes of a near side bulge towards the sonar. Noise, and a vehicle that moves between them, makes them as hollow as
+# this, in metres; a niche or a corner of walls is deeper.
+_HOLLOW = 0.25
+# Radii tried for a pair of echoes; more tell nothing new, and clouds with few pairs need not be searched for long.
+_RADII_PER_PAIR = 100
 _RAYS = 9  # across a beam's width
 _RANGE_DEVIATION, _BEARING_DEVIATION = 0.1, 0.15  # m, standard deviations of a range and, across, of a bearing
 
@@ -143,6 +150,7 @@ class CircleDetector:
         self.parameters = parameters
 
     def __call__(self, cloud: Cloud, sonar_positions: SonarPositions) -> List[Circle]:
+        """Return the circles of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
         strong = echoes.strong(self.parameters.min_echo_share)
         if not len(strong):

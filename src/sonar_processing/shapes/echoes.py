@@ -8,25 +8,32 @@ import numpy as np
 from sonar_processing.cloud import Cloud
 
 _SAME_POINT = 1e-6
-_NEIGHBOURS = 4  # echoes looked at on each side: some hold noise or another surface in front of the wall
-_REACH = 2.5  # beams from an echo to the next one of its wall: one or two between may hear nothing
-_CONTINUED = 1.5  # share of two echoes' distance by which their wall goes on; farther out their noise would aim it
-# Sine of the angle between beam and wall above which two echoes make a line. In flatter lines two echoes may be by
-# chance, a thing and something far behind it: then _FLAT_SUPPORT echoes have to lie on it.
+_NEIGHBOURS = 4  # Echoes looked at on each side: some hold noise or another surface in front of the wall
+# Beams from an echo to the next one of its wall: one that heard nothing, or two where the head is slow, lie between.
+_REACH = 2.5
+# A wall goes on beyond two of its echoes by this share of their distance; farther out their noise would aim it.
+_CONTINUED = 1.5
+# Sine of the angle between beam and wall above which two echoes make a line. Flatter lines lead from a thing to
+# something far behind it, so that two echoes are in line by chance; then _FLAT_SUPPORT echoes have to lie on it.
 _SQUARE, _FLATTEST, _FLAT_SUPPORT = 0.5, 0.05, 4
-_NEXT_BEAM = 1.4  # times as far as the beams are apart: there a wall that is not seen too flat goes on
-_ALIKE = 0.5  # share of the bins of a wall's echo that its neighbour has at least; noise has fewer
-_OBLIQUE = 0.7  # of two echoes' distance across the beams: by more along them they are of a wall that is met obliquely
-_SCATTERED = 2.0  # times as far apart as the bins of the usual echo: bins of speckle
+# A wall goes on in the next beam, so many times as far away as the beams are apart, where it is not seen too flat.
+_NEXT_BEAM = 1.4
+# Echoes of a wall's neighbouring beams are alike; a lone thing's neighbours hold noise, of fewer bins than this share.
+_ALIKE = 0.5
+# Two echoes of a thing lie across the beams; of a wall that the beams meet obliquely, the one is so much farther away
+# than the other, as a share of their distance across.
+_OBLIQUE = 0.7
+_SCATTERED = 2.0  # Bins of speckle are farther apart than those of the usual echo, by this factor at least
 
 
 @dataclass(frozen=True)
 class BeamEchoes:
     """The echoes of one scan, seen from above.
 
-    points: (m, 2) float64, x y [m]: the middle of each echo, weighted by strength. weights: (m,) number of cloud points
-    in each. lengths: (m,) along the beam, m. members: (k,) indices of the finite points of the cloud; owner: (k,) the
-    echo that each of them belongs to. time_stamps: (m,) of the beams, s, without the sign that tells still from moving.
+    points: (m, 2) float64, x y [m]: the middle of each echo, weighted by strength.
+    weights: (m,) number of cloud points in each. lengths: (m,) from the nearest point of each to the farthest, m.
+    members: (k,) indices of the finite points of the cloud; owner: (k,) the echo that each of them belongs to.
+    time_stamps: (m,) float64, when each echo's beam was taken, s, without the sign that tells still from moving.
     """
 
     points: np.ndarray
@@ -79,8 +86,9 @@ class Sightings:
     """Echoes in the order of their beams.
 
     points: (n, 2) x y [m]. origins: (n, 2) where the sonar was. beams: (n,) number of the beam, growing; a beam without
-    echoes has a number too. weights: (n,) number of cloud points in each echo. lengths: (n,) along the beam, m. step:
-    usual angle from beam to beam, rad, in the cloud's frame: a vehicle that turns with its head widens it.
+    echoes has a number too. weights: (n,) number of cloud points in each echo.
+    lengths: (n,) of each echo along its beam, m.
+    step: usual angle from beam to beam, rad, in the cloud's frame: a vehicle that turns with its head widens it.
     """
 
     points: np.ndarray
@@ -186,8 +194,9 @@ def _across(offsets: np.ndarray, along: np.ndarray) -> np.ndarray:
 def is_alone(group: Sightings, strong: Sightings, weak: Sightings, clearance: float) -> bool:
     """Return whether no other echo belongs to the surface that a group of echoes shows.
 
-    Of the others the `strong` have to be `clearance` [m] away. A surface that is heard faintly goes on in the `weak`:
-    none half as strong as the group's strongest may stand where the next beam would meet it.
+    `strong` are the other echoes that are no noise: each has to be `clearance` [m] away from the group. `weak` are the
+    rest, of few bins: a surface that is heard faintly goes on in them, so that none as strong as half the group's
+    strongest may stand where the next beam would meet it.
     """
     next_beam = _NEXT_BEAM * group.step * float(group.ranges.mean())
     alike = weak.points[weak.weights >= _ALIKE * group.weights.max()]

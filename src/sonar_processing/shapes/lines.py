@@ -34,9 +34,10 @@ class LineDetectorParameters(RansacParameters):
 class Line:
     """A wall found in a cloud, in the cloud's frame.
 
-    normal: (2,) unit vector; offset: m; the wall's points fulfil normal . (x, y) = offset >= 0. ends: (2, 2) x y [m],
-    the feet of the outermost inliers. members: (k,) indices of the cloud's points in it; echoes: number of echoes they
-    make. residual: root mean square distance of the echoes from the line, m.
+    normal: (2,) unit vector; offset: m; the wall's points fulfil normal . (x, y) = offset >= 0.
+    ends: (2, 2) x y [m], the feet of the outermost inliers on the line.
+    members: (k,) indices of the cloud's points in it; echoes: number of echoes they make.
+    residual: root mean square distance of the echoes from the line, m.
     """
 
     normal: np.ndarray
@@ -97,6 +98,7 @@ class LineDetector:
         self.parameters = parameters
 
     def __call__(self, cloud: Cloud) -> List[Line]:
+        """Return the walls of a scan, none where there are too few echoes."""
         echoes = beam_echoes(cloud, self.parameters.echo_gap)
         rng = np.random.default_rng(self.parameters.seed)
         left = echoes.strong(self.parameters.min_echo_share)
@@ -150,7 +152,10 @@ class LineDetector:
 
 
 def fitted_line(points: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return (normal x, normal y, offset >= 0) of the line nearest to points (n, 2) of positive weights (n,)."""
+    """Return (normal x, normal y, offset >= 0) of the line with the least squared distances from points (n, 2).
+
+    weights: (n,), positive; an echo of many bins tells its place better than one of few.
+    """
     center = weights @ points / weights.sum()
     spread = points - center
     normal = np.linalg.eigh((weights * spread.T) @ spread)[1][:, 0]
