@@ -14,16 +14,15 @@ from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 class LiveEstimate:
     """Known from the scan that ended at `time` [s] and those before it.
 
-    T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. node: (width,) the newest node's unknowns.
-    run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
-    own_covariance: the same if the frozen map had no error. reported_velocity: (3,) m/s, m/s, rad/s that the odometry
-    reported in base_link. drift: how the true motion differs from it.
-    world_scale_deviation: of all lengths. comparisons: number of the scan's points that were compared with others.
+    T_odom_base, T_map_base: (3,) then, x y [m], yaw [rad]. node: (width,) the newest node's unknowns. run: (2,) the
+    run's. covariance: (width + 2, width + 2) of both. own_covariance: the same if the frozen map had no error.
+    reported_velocity: (3,) m/s, m/s, rad/s that the odometry reported in base_link. drift: how the true motion differs
+    from it. world_scale_deviation: of all lengths. comparisons: number of the scan's points that were compared.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
-    mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
-    prior_term: what a mixture of priors added; of no unknowns for models without one.
-    misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place. doubt: (3, 3) what
-    another odometry that the vehicle may have adds to the covariance of the pose.
+    their mean distance from these surfaces. surfaces: (2, 2) sum of the outer products of their normals. prior_term:
+    what a mixture of priors added; of no unknowns for models without one. misfit_variance: m^2 in each direction, how
+    uncertain scans that fitted nowhere make the place. doubt: (3, 3) what another odometry adds to the covariance of
+    the pose.
     """
 
     time: float
@@ -78,10 +77,8 @@ class LiveEstimate:
     @property
     def velocity_covariance(self) -> np.ndarray:
         """(3, 3) of `velocity`: what the unknowns of the newest node leave open, without noise of what is reported."""
-        reported = complex(*self.reported_velocity[:2])
-        by_gain = np.exp(1j * self.drift.values[4]) * reported
-        by_direction = 1j * self._gain * reported
-        by_drift = np.eye(3, len(self.drift.values))
+        reported, by_drift = complex(*self.reported_velocity[:2]), np.eye(3, len(self.drift.values))
+        by_gain, by_direction = np.exp(1j * self.drift.values[4]) * reported, 1j * self._gain * reported
         by_drift[:2, 3] = by_gain.real, by_gain.imag
         by_drift[:2, 4] = by_direction.real, by_direction.imag
         slopes = by_drift @ self.drift.slopes
@@ -103,16 +100,13 @@ class LiveEstimate:
 
 
 def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:
-    """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map.
-
-    deviation: of the scale, as a share of 1.
-    """
+    """Return what a relative `deviation` of the world's scale adds to covariances (n, 3, 3) of poses (n, 3) in map."""
     lengths = poses * np.array([1.0, 1.0, 0.0])
     return deviation**2 * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]
 
 
 def misfit_covariance(variances: np.ndarray) -> np.ndarray:
-    """Return what an uncertainty of the place by `variances` (n,) [m^2] adds to the covariances (n, 3, 3) of poses."""
+    """Return what an uncertainty of places by `variances` (n,) [m^2] adds to the covariances (n, 3, 3) of poses."""
     return variances[:, np.newaxis, np.newaxis] * np.diag([1.0, 1.0, 0.0])
 
 
@@ -125,8 +119,9 @@ def expected_deviations(moves: np.ndarray, lengths: np.ndarray, heading_deviatio
 
 
 class Turns(NamedTuple):
-    """n turns. times: (n,) s of their ends. agreements: (n,), surfaces: (n, 2, 2), see LiveEstimate. apart: (n,) bool,
-    whether their place in the map is not known.
+    """n turns. times: (n,) s of their ends. agreements: (n,), surfaces: (n, 2, 2), see LiveEstimate.
+
+    apart: (n,) bool, whether their place in the map is not known.
     """
 
     times: np.ndarray
@@ -150,9 +145,9 @@ class Turns(NamedTuple):
         cls, estimates: Sequence[Optional[LiveEstimate]], apart: np.ndarray, parts: int, point_counts: np.ndarray,
         most: int,
     ) -> "Turns":  # fmt: skip
-        """Return the newest `most` turns in which surfaces were heard; point_counts: (n parts,) of the scans.
+        """Return those of the newest `most` turns in which surfaces were heard whose estimates are not forgotten.
 
-        Turns whose estimates are forgotten are left out.
+        point_counts: (n parts,) of the scans.
         """
         heard = np.flatnonzero(point_counts.reshape(-1, parts).any(axis=1))[-most:]
         heard = heard[[estimates[turn * parts] is not None for turn in heard]]

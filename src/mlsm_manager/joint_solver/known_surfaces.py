@@ -15,10 +15,8 @@ from mlsm_manager.surface_map.blocks import cells_of, keys_of
 from node_support.geometry import cell_keys
 
 _CANDIDATES = 3  # blocks that are looked at for each point: more than there usually are as near as the nearest one
-_SQUARE = 32.0
-"""m: side of the squares into which blocks are sorted, to find those of an area without looking at all."""
-_MARGIN = 64.0
-"""m beyond the scans that are looked at too: so far the vehicle may go before other blocks are looked at."""
+_SQUARE = 32.0  # m: side of the squares into which blocks are sorted, to find those of an area without looking at all
+_MARGIN = 64.0  # m beyond the scans: so far the vehicle may go before other blocks are looked at
 
 
 class KnownSurfaces:
@@ -39,8 +37,12 @@ class KnownSurfaces:
         """Build the tree over blocks at places (n, 2)."""
         normals, qualities = surface_normals(places, np.full(len(places), LEAST_REACH))
         known = qualities > 0.0
-        self._tree = cKDTree(places[known]) if known.any() else None
-        self._points = _placed(places[known], normals[known], qualities[known])
+        self._tree, count = cKDTree(places[known]) if known.any() else None, np.count_nonzero(known)
+        self._points = PlacedPoints(
+            scans=np.full(count, BEFORE_THE_RUN), places=places[known], arms=np.zeros((count, 2)),
+            normals=normals[known], slants=np.zeros(count), qualities=qualities[known], shares=np.zeros(count),
+            by_run=np.zeros((count, 2, 2)),
+        )  # fmt: skip
 
     def _reach(self, places: np.ndarray, cut: float) -> None:
         """Look at all blocks around `places` (n, 2), n > 0, if some that lie within `cut` [m] are not looked at yet."""
@@ -88,11 +90,3 @@ class KnownSurfaces:
         importance = share * fading * sources.qualities[rows] * targets.qualities
         kept = importance > 0.0
         return Pairs(rows[kept], np.arange(int(kept.sum())), importance[kept]), targets.selected(kept)
-
-
-def _placed(places: np.ndarray, normals: np.ndarray, qualities: np.ndarray) -> PlacedPoints:
-    count = len(places)
-    return PlacedPoints(
-        scans=np.full(count, BEFORE_THE_RUN), places=places, arms=np.zeros((count, 2)), normals=normals,
-        slants=np.zeros(count), qualities=qualities, shares=np.zeros(count), by_run=np.zeros((count, 2, 2)),
-    )  # fmt: skip

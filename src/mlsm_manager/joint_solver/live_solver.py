@@ -271,7 +271,7 @@ class LiveSolver:
         return self.search.line() if self.search is not None and self.search.is_certain else ""
 
     def _search(self) -> None:
-        """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin a submap."""
+        """Put the newest nodes where their scans fit, if the motion is hardly known."""
         if self._parts == 1 and len(self.estimates) > self._silent:
             covariance = self.estimates[-1 - self._silent].own_covariance
             self.search = put_newest(self.solution, covariance, self._silent)

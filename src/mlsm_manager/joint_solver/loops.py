@@ -2,8 +2,8 @@
 
 A scan is laid over what much older scans heard, at all places around its own. A place counts when it is certain, fits
 much better than the present one, and neighbouring scans agree. While the run goes on, the frozen past then moves by
-what its stated covariance expects (the errors of a random walk), which needs no solution of the whole run: nodes that
-were as certain as the older visit stay, and what was lost since then is given back.
+what its stated covariance expects (the errors of a random walk): nodes that were as certain as the older visit stay,
+and what was lost since then is given back.
 """
 
 from dataclasses import dataclass
@@ -72,10 +72,7 @@ def agreed(loops: Sequence[Loop]) -> List[Loop]:
 
 
 def pulls_of(loops: Sequence[Loop], layout: Layout, nodes: np.ndarray, start: State) -> Iterator[Residuals]:
-    """Return that the scans of `loops` are moved by their shifts against `start`, in which these were found.
-
-    nodes: (n, width) as they are now.
-    """
+    """Return that the scans of `loops` are moved by their shifts against `start`, in which these were found."""
     ends = np.array([[loop.scan + 1, loop.older + 1] for loop in loops])
     now, then = (some[ends[:, 0], :2] - some[ends[:, 1], :2] for some in (nodes, start.nodes))
     return moves_between(layout, ends, now - then - np.array([loop.place.shift for loop in loops]), _DEVIATION)

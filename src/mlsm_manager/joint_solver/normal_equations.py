@@ -52,12 +52,10 @@ class Layout:
 
     @cached_property
     def run_start(self) -> int:
-        """Place of the run's first unknown."""
         return self.width * (self.last - self.first + 1)
 
     @cached_property
     def size(self) -> int:
-        """Number of free unknowns."""
         return self.run_start + RUN_COLUMNS
 
     def node_start(self, node: np.ndarray) -> np.ndarray:
@@ -81,10 +79,9 @@ class Layout:
 
 
 class Residuals(NamedTuple):
-    """m residuals of c unknowns each.
+    """m residuals. columns: (m, c) int, of each one's c unknowns, negative for constants. jacobian: (m, c).
 
-    columns: (m, c) int, of each residual's unknowns, negative for constants. jacobian: (m, c). values, weights: (m,); a
-    weight is the inverse of the variance.
+    values, weights: (m,); a weight is the inverse of the variance.
     """
 
     columns: np.ndarray
@@ -104,10 +101,7 @@ def prior_of(columns: np.ndarray, off: np.ndarray, deviation: np.ndarray, held: 
 
 
 def moves_between(layout: Layout, ends: np.ndarray, errors: np.ndarray, deviation: float) -> Iterator[Residuals]:
-    """Yield in x and y that moves from the second to the first of two nodes, `ends` (m, 2), err by `errors` (m, 2) [m].
-
-    deviation: m, in each direction.
-    """
+    """Yield in x and y that moves from the second to the first of two nodes `ends` (m, 2) err by `errors` (m, 2)."""
     columns = layout.pose_columns(ends)
     jacobian, weights = np.tile([1.0, -1.0], (len(ends), 1)), np.full(len(ends), deviation**-2.0)
     for axis in (0, 1):
@@ -142,10 +136,7 @@ class NormalEquations:
         self._terms.append(information)
 
     def dense(self) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the information of the free unknowns (size, size), and that between them and the held ones.
-
-        For problems of bounded size.
-        """
+        """Return the information of the free unknowns (size, size), and that between them and the held ones."""
         side = self._columns_end + 1
         result = np.zeros((side, side))
         for columns, terms in zip(self._columns, self._terms):
@@ -177,10 +168,10 @@ class EquationSolution:
     to_held: np.ndarray
 
     def covariances(self, columns: np.ndarray, held_covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the covariances (b, k, k) of b sets of unknowns, `columns` (b, k), where held ones err by
-        `held_covariance`, and the same if these had no error.
+        """Return the covariances (b, k, k) of unknowns in `columns` (b, k), and the same if held ones had no error.
 
-        That is what Schmidt (1966) calls considering the parameters that are not estimated.
+        held_covariance: by which these err. That is what Schmidt (1966) calls considering parameters that are not
+        estimated.
         """
         sets, each = columns.shape
         unit = np.zeros((len(self.step), columns.size))

@@ -6,7 +6,7 @@ from typing import Optional, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import QuickFit
-from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
+from mlsm_manager.joint_solver.motion_models import SCALE
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.run_log import RunLog
@@ -35,7 +35,9 @@ def freed_errors(run: Solution) -> Optional[OdometryErrors]:
     model = run.parameters.odometry.freed
     if model is None:
         return None
-    freed = replace(run, parameters=replace(run.parameters, odometry=model), state=_for_model(run.state, model))
+    start = State(np.zeros((len(run.state.nodes), model.width)), run.state.run.copy())
+    start.nodes[:, : run.state.nodes.shape[1]] = run.state.nodes
+    freed = replace(run, parameters=replace(run.parameters, odometry=model), state=start)
     nodes = QuickFit.of(freed).state.nodes
     reported = run.log.node_poses(np.arange(len(nodes)))
     scales = np.zeros(len(nodes))
@@ -88,10 +90,3 @@ def reckoned(run: Solution, log: RunLog, nodes: np.ndarray, stretch: Tuple[float
         result[node, :YAW] = run.parameters.odometry.advanced(result[node - 1 : node], motion)[0, :YAW]
         result[node + 1 :, :YAW] = nodes[node + 1 :, :YAW] + result[node, :YAW] - nodes[node, :YAW]
     return result
-
-
-def _for_model(state: State, model: OdometryModel) -> State:
-    """Return a state with the unknowns of `model`: those that it has besides begin at zero."""
-    nodes = np.zeros((len(state.nodes), model.width))
-    nodes[:, : state.nodes.shape[1]] = state.nodes
-    return State(nodes, state.run.copy())

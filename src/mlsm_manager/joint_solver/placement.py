@@ -125,12 +125,11 @@ def placed_rows(heard, normals, sonar_in_base, range_scale, nodes, knots, half_w
 
 @dataclass(frozen=True)
 class PlacedPoints:
-    """n points in the map.
+    """n points in the map. scans: (n,) which scan heard them. places: (n, 2) m. normals: (n, 2). slants: (n,) m.
 
-    scans: (n,) which scan heard them. places: (n, 2) m. arms: (n, 2) m, by which the nodes' yaw turns them: from
-    base_link to them, and the bow of the path between the nodes. normals: (n, 2). slants: (n,) m. qualities: (n,).
-    shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second. by_run: (n, 2, 2) derivatives of the
-    places by range scale and delay, last axis the unknown.
+    arms: (n, 2) m, by which the nodes' yaw turns them: from base_link to them, and the bow of the path between the
+    nodes. qualities: (n,). shares: (n,) when they were heard: 0 at the scan's first node, 1 at its second. by_run: (n,
+    2, 2) derivatives of the places by range scale and delay, last axis the unknown.
     """
 
     scans: np.ndarray

@@ -34,10 +34,10 @@ _LEAD = 0.1  # by which that share must exceed the one at any other place
 
 @dataclass(frozen=True)
 class PlaceCandidate:
-    """The best place that a search found.
+    """shift: (2,) m from the expected place to the best one that a search found. reach: m, deviation of the place.
 
-    shift: (2,) m from the expected place. fit, fit_before, elsewhere: shares of the points on surfaces there, at the
-    expected place, and at the best other one. reach: m, deviation of the place.
+    fit, fit_before, elsewhere: shares of the points on surfaces there, at the expected place, and at the best other
+    one.
     """
 
     shift: np.ndarray
@@ -48,7 +48,6 @@ class PlaceCandidate:
 
     @property
     def is_certain(self) -> bool:
-        """Whether the points fit there, and nowhere else."""
         return self.fit >= max(_FIT, self.elsewhere + _LEAD)
 
     def line(self) -> str:
@@ -89,10 +88,7 @@ def _widest(covariance: np.ndarray) -> float:
 
 
 def _places_within(covariance: np.ndarray, most: int) -> np.ndarray:
-    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2); the first one is none.
-
-    They are a cell apart; farther where there would be more than `most` on each side.
-    """
+    """Return shifts (n, 2) [m] that cover the ellipse of a covariance (2, 2), none first; `most` on each side."""
     reach = REACH * np.sqrt(np.diag(covariance))
     cell = max(_CELL, float(reach.max()) / most)
     x, y = (cell * np.arange(-np.floor(one / cell), np.floor(one / cell) + 1.0) for one in reach)
@@ -150,11 +146,10 @@ def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optio
 
 
 def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) -> np.ndarray:
-    """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
+    """Return the newest node (width,), moved to where its scan fits best what the scans from `first` on heard.
 
-    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
-    is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
-    covariance asks (correlative search, Olson 2009).
+    covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
+    far from the expected one must fit better by what the motion's covariance asks.
     """
     log, state, newest = solution.log, solution.state, solution.state.nodes[-1]
     last, step = log.scan_count, covariance_since(solution, covariance, 0)
@@ -264,7 +259,7 @@ def _post_support(solution: Solution, shifts: np.ndarray) -> np.ndarray:
 
 
 def covariance_since(solution: Solution, covariance: np.ndarray, silent: int) -> np.ndarray:
-    """Return that of the newest node (width, width) as seen from the one before `silent` scans and the newest one.
+    """Return that of the newest node (width, width) as seen from the one before it and `silent` scans.
 
     covariance: (width, width) of that node.
     """

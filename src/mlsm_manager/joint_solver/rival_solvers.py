@@ -17,8 +17,8 @@ from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
 
 _OTHER = "rival."  # before the names in stored maps
-# Nats: from 20 : 1 on the DVL is believed, which nothing corrects if it is none; the other model errs less, and is
-# believed again below 3 : 1. Beyond 10^5 : 1 against it the DVL is followed no more.
+# Nats by which the DVL is likelier: from which on it is believed, which nothing corrects if it is none; below which it
+# is not believed any more; below which it is followed no more.
 _CLEAR, _DOUBTED, _EXCLUDED = 3.0, 1.0, -12.0
 _MOST_TIMES = 1000.0  # more is certain
 
@@ -54,7 +54,7 @@ class RivalSolvers:
         cls, parameters: SolverParameters, sonar_in_base: np.ndarray, start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
     ) -> "RivalSolvers":  # fmt: skip
-        """Return those of a new run; arguments as LiveSolver's."""
+        """Arguments as LiveSolver's."""
         solver = LiveSolver(parameters, RunLog(sonar_in_base), start, known)
         return cls(solver, _of_rival(solver))
 
@@ -65,7 +65,7 @@ class RivalSolvers:
 
     @property
     def parameters(self) -> SolverParameters:
-        """What `resumed` needs to have both odometries, where there are two."""
+        """What `resumed` needs."""
         return self.shown.parameters if self.other is None else self._unsure.parameters
 
     @property
@@ -85,13 +85,11 @@ class RivalSolvers:
         """Return those that go on after `scans`. Raises as LiveSolver.resumed does, and RefusedInput."""
         log = RunLog(sonar_in_base)
         log.take(scans, parameters.parts_per_turn, parameters.lookahead)
-        other = {name[len(_OTHER) :]: array for name, array in stored.items() if name.startswith(_OTHER)}
-        shown, *others = (
-            LiveSolver.resumed(_as_stored(parameters, one), log, one)
-            for one in (stored, other)
-            if one is stored or (one and parameters.odometry.rival is not None)
-        )
-        return cls(shown, others[0] if others else None)
+        shown, other = LiveSolver.resumed(_as_stored(parameters, stored), log, stored), None
+        of_other = {name[len(_OTHER) :]: array for name, array in stored.items() if name.startswith(_OTHER)}
+        if of_other and parameters.odometry.rival is not None:
+            other = LiveSolver.resumed(_as_stored(parameters, of_other), log, of_other)
+        return cls(shown, other)
 
     @property
     def told(self) -> str:
@@ -108,8 +106,11 @@ class RivalSolvers:
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
         """Take the next scan; see LiveSolver.add. fix: in the map of `shown`."""
-        self.switched = False
-        of_other = self._of_other(fix)
+        self.switched, of_other = False, None
+        if fix is not None and self.other is not None:
+            # Whatever the odometry is, the scan lies as far from the one before it.
+            apart = self.other.estimates[-1].T_map_base - self.shown.estimates[-1].T_map_base
+            of_other = replace(fix, place=fix.place + apart[:2])
         self.shown.add(scan, fix)
         if self.other is not None:
             try:
@@ -118,13 +119,6 @@ class RivalSolvers:
             except RefusedInput:
                 self.other, self.doubt, self._dvl_lead = None, None, np.nan
         return self.shown.estimates[-1]
-
-    def _of_other(self, fix: Optional[Fix]) -> Optional[Fix]:
-        """Return a fix for the other solver: whatever the odometry is, the scan lies as far from the one before it."""
-        if fix is None or self.other is None:
-            return None
-        apart = self.other.estimates[-1].T_map_base - self.shown.estimates[-1].T_map_base
-        return replace(fix, place=fix.place + apart[:2])
 
     def _weigh(self) -> None:
         """Show the solver that the echoes speak for, and say how uncertain the other one makes it."""
@@ -179,9 +173,7 @@ class RivalSolvers:
         """Keep the doubt where it is the largest."""
         apart = np.hypot(*(others - places)[:, :2].T)
         deviation = np.sqrt(np.maximum(np.trace(added[:, :2, :2], axis1=1, axis2=2), 0.0))
-        shown, other = self._names
-        told = likelier(shown, self.lead, other)
-        self.doubt = Doubt(told, other, float(apart.max()), float(deviation.max()), own)
+        self.doubt = Doubt(self.told, self._names[1], float(apart.max()), float(deviation.max()), own)
 
 
 def likelier(shown: str, lead: float, other: str) -> str:
@@ -210,10 +202,7 @@ def _as_stored(parameters: SolverParameters, stored: Mapping[str, np.ndarray]) -
 def _added(
     lead: float, poses: np.ndarray, others: np.ndarray, covariances: np.ndarray, other_covariances: np.ndarray
 ) -> np.ndarray:
-    """Return what other poses (n, 3), less likely by `lead` nats, add to the covariances (n, 3, 3) of `poses` (n, 3).
-
-    With it the covariances are those of the squared error where either may be true.
-    """
+    """Return what other poses (n, 3), less likely by `lead` nats, add to covariances (n, 3, 3) of `poses` (n, 3)."""
     apart = others - poses
     share = 1.0 / (1.0 + np.exp(lead))
     return share * (np.einsum("na,nb->nab", apart, apart) + other_covariances - covariances)

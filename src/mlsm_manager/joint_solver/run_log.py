@@ -43,10 +43,7 @@ class PointTable:
         self._starts.extend([self._starts.values[-1] + count])
 
     def since(self, scan: int, change: Optional[Callable[[SurfacePoints], SurfacePoints]] = None) -> "PointTable":
-        """Return a table of `scan` and all later ones, the first of which is number 0 there.
-
-        change: what makes of the points of a scan those of the table.
-        """
+        """Return a table of what `change` makes of `scan` and all later ones, the first of which is number 0 there."""
         later = PointTable()
         for number in range(scan, self.scan_count):
             points, _ = self.heard(number, number + 1)
@@ -88,8 +85,8 @@ class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
     sonar_in_base: (2,) m. surfaces: points on surfaces. posts: echoes of what is small. Points of scans may be
-    forgotten; the nodes stay. scan_count: so far. node_times: (scan_count + 1,) s; empty before the first scan.
-    forgotten: (scan_count,) bool, whose points are. The next scan makes both views invalid.
+    forgotten; the nodes stay. node_times: (scan_count + 1,) s; empty before the first scan. forgotten: (scan_count,)
+    bool, whose points are. The next scan makes both views invalid.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -188,7 +185,6 @@ class RunLog:
         return other
 
     def node_motion(self, nodes: np.ndarray) -> Motion:
-        """Return what the odometry reported up to `nodes` (n,)."""
         return self.odometry.motion(self.node_times[nodes])
 
     def node_poses(self, nodes: np.ndarray) -> np.ndarray:

@@ -25,11 +25,10 @@ MAP = 0  # the submap of all scans whose place in the map is known
 class Submaps:
     """Which scans are compared with each other: those after a silence wait apart until their place in the map is known.
 
-    Every scan of a run has the number of its submap; a new one begins where nobody knows where the vehicle is.
+    Every scan of a run has the number of its submap.
     """
 
     def __init__(self, numbers: np.ndarray) -> None:
-        """numbers: (n,) of the scans so far."""
         self._numbers: List[int] = [int(number) for number in numbers]
         self._begun = max(self._numbers, default=MAP)
 
@@ -45,7 +44,6 @@ class Submaps:
 
     @property
     def is_apart(self) -> bool:
-        """Whether the place of the newest scan in the map is not known."""
         return self.newest != MAP
 
     @property
@@ -70,7 +68,7 @@ class Submaps:
         self._numbers[-1] = self._begun
 
     def join(self) -> None:
-        """Put the newest submap into the map, because its place is known now."""
+        """Put the newest submap into the map."""
         joined = self.newest
         self._numbers = [MAP if number == joined else number for number in self._numbers]
 
@@ -121,7 +119,6 @@ class Fixes:
                 equations.add_terms(columns[np.newaxis], fix.information[np.newaxis], gradient[np.newaxis])
 
     def stored(self) -> Dict[str, np.ndarray]:
-        """Return what `of_arrays` needs, by name."""
         fixes = self.by_node.values()
         return {
             _NODES: np.array(list(self.by_node), dtype=np.int64),
@@ -142,7 +139,6 @@ class Solution:
 
     state: the unknowns of the run in `log`. submaps: which of its scans are compared with each other. known: surfaces
     that were in the map before the run. prior_term: what a mixture of priors added to the newest node; None before.
-    fixes: of single scans.
     """
 
     log: RunLog
@@ -226,9 +222,8 @@ def _path(
 ) -> Tuple[np.ndarray, np.ndarray]:
     """Return the nodes (n, 8), and poses of the odometry between two times (k, 4), as compiled loops take them.
 
-    times: (n,) s. nodes: (n, width). Between two nodes the path is the model's reference path, which is even between
-    the poses, turned and scaled by the mean of both gains, and stretched to lead from one to the other. The last gain
-    is that with which it goes on.
+    times: (n,) s. nodes: (n, width). Between two nodes the path is the model's reference path, turned and scaled by the
+    mean of both gains, and stretched to lead from one to the other. The last gain is that with which it goes on.
     """
     motion, known = log.path(times, *around)
     places, gain = motion.poses[:, :2] + nodes[:, :2], odometry.gain(nodes)

@@ -204,10 +204,7 @@ def _crowds(points: np.ndarray, reach: np.ndarray) -> np.ndarray:
 
 
 def _on_surfaces(places: np.ndarray, reach: np.ndarray, surfaces: SurfacePoints) -> np.ndarray:
-    """Return how much points at `places` (n, 2) [m] from the sonar lie where surfaces near them go on: (n,), 0 to 1.
-
-    reach: (n,) m, within which neighbours on a surface are.
-    """
+    """Return how much points at `places` (n, 2) [m] from the sonar lie where surfaces near them go on: (n,), 0 to 1."""
     if not len(places) or not len(surfaces):
         return np.zeros(len(places))
     known = surfaces.ranges[:, np.newaxis] * np.column_stack([np.cos(surfaces.bearings), np.sin(surfaces.bearings)])

@@ -56,8 +56,8 @@ class HeadingFactors(OdometryModel):
     """Nodes have columns x, y, yaw, then in base_link the speeds ahead and aside, and the speed of travel [m/s].
 
     The speed ahead forgets its difference from the speed of travel (an Ornstein-Uhlenbeck process), the speed aside
-    forgets itself. Between nodes both speeds change evenly, which is where such a process is expected; what it strays
-    from there by is the variance of the steps. Reported positions are not used.
+    itself. Between nodes both speeds change evenly, which is where such a process is expected; what it strays from
+    there by is the variance of the steps. Reported positions are not used.
     """
 
     width = 6
@@ -124,12 +124,10 @@ class HeadingFactors(OdometryModel):
         return [*self._positions(nodes, motion), changes, self._speeds_ahead(nodes, durations)]
 
     def _kept(self, durations: np.ndarray) -> tuple:
-        """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
         times = self._speeds.speed_correlation_time, self._speeds.slip_correlation_time
         return tuple(np.exp(-durations / time) for time in times)
 
     def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
-        """Return how unknowns change from node to node that do not only walk."""
         _, slipping = self._kept(durations)
         return {ASIDE: Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))}
 
@@ -216,9 +214,9 @@ class UnaidedFactors(HeadingFactors):
 
 
 def _bridged(deviation: float, time: float, durations: np.ndarray) -> np.ndarray:
-    """Return the variances of an integral over `durations` (n,) of a process that forgets, whose ends are known.
+    """Return the variances of the integral over `durations` (n,) of a process that forgets, whose ends are known.
 
-    The integral less the mean of both ends times the duration; for short durations that is a random walk's bridge.
+    It is less the mean of both ends times the duration; for short durations that is a random walk's bridge.
     """
     return deviation**2 * np.minimum(durations**3 / (6.0 * time), 2.0 * time * durations)
 
@@ -234,8 +232,8 @@ def by_heading(
 ) -> np.ndarray:
     """Return columns (size, 4) whose outer product is what the error adds to the covariance of all unknowns.
 
-    yaws: (n,) rad, reported at the nodes of `layout`, at `times` (n,) [s]. solve: the information's inverse
-    times columns. The error is an unknown of its own that is eliminated; the solution stays where it is.
+    yaws: (n,) rad, reported at the nodes of `layout`, at `times` (n,) [s]. solve: the information's inverse times
+    columns. The error is an unknown of its own that is eliminated; the solution stays where it is.
     """
     errors, change = harmonics(yaws) * _TIMES * compass.heading_deviation, compass.change(times)
     steps = errors[1:] - change.kept[:, np.newaxis] * errors[:-1]

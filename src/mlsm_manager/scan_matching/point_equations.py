@@ -22,8 +22,7 @@ class Correspondences:
     """The block of the map that each point is compared with, and how far it lies from it.
 
     world: (n, 2) places in map. arms: (n, 2) m from the vehicle to them. nearest: (n,) their blocks, at `distances`
-    (n,) m. metric: (n, 2, 2) inverse covariance. residual: (n, 2) m. squared: (n,) the residuals' squared Mahalanobis
-    length.
+    (n,) m. metric: (n, 2, 2) inverse covariance. residual: (n, 2) m. squared: (n,) its squared Mahalanobis length.
     """
 
     world: np.ndarray
@@ -39,9 +38,9 @@ class Correspondences:
 class Normal:
     """Normal equations of the points at a state, where nothing is known of the ranges' scale but that it is 1.
 
-    gradient: (n, 8) of each point. jacobian: (n, 2, 8) derivative of each place by the state. weighted_jacobian:
-    (n, 2, 8) the same times the weighted metric. weighted_arms: (n, 2) the derivative by the ranges' scale, which is
-    the arms, times the weighted metric. weight: (n,) of each point before the robust kernel.
+    gradient: (n, 8) of each point. jacobian: (n, 2, 8) derivative of each place by the state. weighted_jacobian: (n, 2,
+    8) the same times the weighted metric. weighted_arms: (n, 2) the derivative by the ranges' scale, which is the arms,
+    times the weighted metric. weight: (n,) of each point before the robust kernel.
     """
 
     correspondences: Correspondences
@@ -70,8 +69,8 @@ class Normal:
 class PointEquations:
     """Compares the points of one scan with the local distributions of a map.
 
-    An error of all ranges in proportion is one more unknown and is integrated out: between walls that converge it
-    looks like a motion.
+    An error of all ranges in proportion is one more unknown and is integrated out: between walls that converge it looks
+    like a motion.
     """
 
     def __init__(
