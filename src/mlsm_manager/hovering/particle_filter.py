@@ -33,7 +33,7 @@ _PULLED = 0.5  # share of the particles that are moved; the others stay where th
 
 @dataclass(frozen=True)
 class ParticleFilter:
-    """What is known after the scans of a log so far; the next one makes another ParticleFilter. It is a NodeSearch.
+    """What is known after the scans of a log so far; the next one makes another ParticleFilter.
 
     seed: equal ones draw equal particles. remembered_turns: how far back paths reach. scans: how many were followed.
     echoes: of the newest of them. particles: None before the first scan, which begins where the odometry says.

@@ -6,7 +6,7 @@ from typing import NamedTuple, Optional, Sequence
 import numpy as np
 
 from mlsm_manager.joint_solver.motion_models import DRIFT_SCALE, Drift
-from mlsm_manager.joint_solver.normal_equations import DELAY, POSE, POSE_COLUMNS, RANGE_SCALE, RUN_COLUMNS
+from mlsm_manager.joint_solver.normal_equations import POSE, POSE_COLUMNS, RUN_COLUMNS
 from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 
 
@@ -87,16 +87,6 @@ class LiveEstimate:
     @property
     def _gain(self) -> complex:
         return complex((1.0 + self.drift.values[3]) * np.exp(1j * self.drift.values[4]))
-
-    @property
-    def range_scale(self) -> float:
-        """True range over reported range, minus 1."""
-        return float(self.run[RANGE_SCALE])
-
-    @property
-    def sonar_delay(self) -> float:
-        """Seconds by which beams are later than their stamps."""
-        return float(self.run[DELAY])
 
 
 def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:

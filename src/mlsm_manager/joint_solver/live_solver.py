@@ -7,7 +7,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.estimate import LiveEstimate, expected_deviations
 from mlsm_manager.joint_solver.known_surfaces import KnownSurfaces
-from mlsm_manager.joint_solver.loops import CONVINCING, Bend, ClosedLoop, Loop, confirmed, with_newest
+from mlsm_manager.joint_solver.loops import CONVINCING, Bend, Loop, confirmed, with_newest
 from mlsm_manager.joint_solver.map_support import FrozenPlaces, misfits_with_newest
 from mlsm_manager.joint_solver.motion_models import SCALE, OdometryModel
 from mlsm_manager.joint_solver.normal_equations import POSE_COLUMNS, YAW, State
@@ -53,7 +53,7 @@ class LiveSolver:
         self.submaps = Submaps(np.empty(0))
         self.fixes = Fixes()
         self.search: Optional[PlaceCandidate] = None
-        self.closed: Optional[ClosedLoop] = None
+        self.closed = ""
         self._may_bend = known is None
         self._loops: Tuple[Loop, ...] = ()
         self._by_parts = parameters.node_search
@@ -176,7 +176,7 @@ class LiveSolver:
             # numpy and scipy raise a ValueError where they meet what is not finite.
             self.state = before
             self._by_parts, self._loops = by_parts, loops
-            self.fixes.by_node.pop(self.log.scan_count, None)
+            self.fixes.pop(self.log.scan_count, None)
             self.submaps.shorten(scans)
             text = f"the scan that ends at {self.log.node_times[-1]:.3f} s: {error}"
             raise RefusedInput("scans without a solution", text) from error
@@ -199,14 +199,14 @@ class LiveSolver:
         if fix is None:
             self._search()
         else:
-            self.fixes.by_node[self.log.scan_count] = fix
+            self.fixes[self.log.scan_count] = fix
             state.nodes[-1, :YAW] = fix.place - self.log.node_poses(np.array([self.log.scan_count]))[0, :YAW]
         window = self._fitted()
         if self.submaps.is_apart:
             self.search = put_submap(self.solution, window.estimates(1)[0].covariance[:2, :2])
             if self.search.is_certain:
                 window = self._fitted()
-        self.closed = None
+        self.closed = ""
         # Parts of a turn hear too little for it, and some maps never move.
         if self._parts == 1 and self._may_bend and not self.submaps.is_apart:
             window = self._closed(window)
@@ -262,7 +262,8 @@ class LiveSolver:
         self._loops = ()
         self.fixes = Fixes()  # in the map as it was
         seconds = self.log.node_times[-1] - self.log.node_times[loops[-1].older + 1]
-        self.closed = ClosedLoop(float(seconds), state.nodes[-1, :2] - now.nodes[-1, :2])
+        metres = np.hypot(*(state.nodes[-1, :2] - now.nodes[-1, :2]))
+        self.closed = f"found a place heard {seconds:.0f} s ago again: moved by {metres:.1f} m"
         return self._fitted()
 
     @property

@@ -196,14 +196,3 @@ class Bend:
         """Return what share (f,) is left of `variances` (f,) [m^2] of the first places after a `share` of the shift."""
         known = share * (self.shares * self.lost)[: len(variances)]
         return 1.0 - known / np.maximum(variances, _HELD**2)
-
-
-@dataclass(frozen=True)
-class ClosedLoop:
-    """A loop that the path went over to. seconds: since the place was heard before. shift: (2,) m, of the end."""
-
-    seconds: float
-    shift: np.ndarray
-
-    def line(self) -> str:
-        return f"found a place heard {self.seconds:.0f} s ago again: moved by {np.hypot(*self.shift):.1f} m"

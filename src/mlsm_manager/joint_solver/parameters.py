@@ -1,7 +1,7 @@
 """Parameters of the joint solver. Every default describes a sensor or a method and gives its reason, none a place."""
 
 from dataclasses import dataclass, field
-from typing import Dict, Mapping, Optional, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -64,26 +64,6 @@ class JointSolverParameters(ParameterSet):
     )  # fmt: skip
 
 
-class NodeSearch(Protocol):
-    """Finds the newest nodes where only echoes tell the motion within a turn. Each scan makes another one."""
-
-    @property
-    def variance(self) -> float:
-        """How far the places differ that it takes for possible [m^2], in the direction in which they differ most."""
-
-    def followed(self, log: RunLog, parameters: "SolverParameters") -> "NodeSearch":
-        """Return the search after all scans of `log`, the first of which are those followed before."""
-
-    def placed(self, log: RunLog, nodes: np.ndarray, parameters: "SolverParameters", starts_known: bool) -> np.ndarray:
-        """Return the newest of `nodes` (n, width) at their likeliest places. starts_known: where the first is."""
-
-    def stored(self) -> Dict[str, np.ndarray]:
-        """Return what `resumed` needs besides the log, as arrays by name."""
-
-    def resumed(self, log: RunLog, parameters: "SolverParameters", stored: Mapping[str, np.ndarray]) -> "NodeSearch":
-        """Return the search after all scans of `log`, which `stored` it then. Raises ValueError, KeyError."""
-
-
 def _none_given() -> OdometryModel:
     raise TypeError("SolverParameters without odometry, a model of the vehicle's motion")
 
@@ -109,7 +89,7 @@ class SolverParameters(JointSolverParameters):
     tolerance: float = 0.01  # m: a step below this in the positions' mean square ends the iteration
     kept_scans: int = 200  # newest ones of which all is kept; of older ones only what a scan may be compared with
     odometry: OdometryModel = field(default_factory=_none_given)
-    node_search: Optional[NodeSearch] = None
+    node_search: Any = None
 
     @property
     def free_nodes(self) -> int:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 from operator import attrgetter
-from typing import Dict, Iterator, List, NamedTuple
+from typing import Dict, Iterator, List
 
 import numpy as np
 
@@ -164,20 +164,12 @@ class ThrusterFactors(DvlFactors):
         return Drift(values, slopes)
 
 
-class OdometryDoubt(NamedTuple):
-    """dvl_share: the probability that the odometry is a DVL's; deviations if it is not, relative and [m/s].
-
-    no_current: m/s, stands for none. current_told: m/s, standard deviation from which on the echoes are asked whether
-    there is a current. scale_walk [1/sqrt(s)], current_walk [m/s/sqrt(s)]: how fast what the echoes told is forgotten.
-    """
-
-    dvl_share: float
-    scale_deviation: float
-    current_deviation: float
-    no_current: float
-    current_told: float
-    scale_walk: float
-    current_walk: float
+_DVL_SHARE = 0.8  # probability that an unnamed odometry is a DVL's: data sheets are usually right
+_SCALE_DEVIATION = 0.3  # if it is not: the speed at a thrust is known to a third
+_CURRENT_DEVIATION, _NO_CURRENT = 0.1, 0.003  # m/s; the second stands for none
+_CURRENT_TOLD = 0.05  # m/s, half of a slow current: deviation from which on the echoes are asked whether there is one
+# 1/sqrt(s), m/s/sqrt(s): how fast what the echoes told is forgotten.
+_SCALE_WALK, _CURRENT_WALK = 0.1 / np.sqrt(600.0), 0.002
 
 
 class UnsureFactors(ThrusterFactors):
@@ -186,21 +178,21 @@ class UnsureFactors(ThrusterFactors):
     Scale and current do not walk within the window of the live solver, nor within a run that is refined.
     """
 
-    def __init__(self, dvl: PositionOdometry, doubt: OdometryDoubt) -> None:
-        super().__init__(replace(dvl, scale_deviation=doubt.scale_deviation, current_deviation=doubt.current_deviation))
+    def __init__(self, dvl: PositionOdometry) -> None:
+        super().__init__(replace(dvl, scale_deviation=_SCALE_DEVIATION, current_deviation=_CURRENT_DEVIATION))
         self.rival = DvlFactors(dvl)
-        still, flowing = doubt.no_current, doubt.current_deviation
-        share = (1.0 - doubt.dvl_share) / 2.0
+        still, flowing = [_NO_CURRENT, _NO_CURRENT], [_CURRENT_DEVIATION, _CURRENT_DEVIATION]
+        share = (1.0 - _DVL_SHARE) / 2.0
         components = (
-            PriorComponent("THRUSTERS", share, np.array([doubt.scale_deviation, still, still])),
-            PriorComponent("THRUSTERS in a current", share, np.array([doubt.scale_deviation, flowing, flowing])),
+            PriorComponent("THRUSTERS", share, np.array([_SCALE_DEVIATION, *still])),
+            PriorComponent("THRUSTERS in a current", share, np.array([_SCALE_DEVIATION, *flowing])),
         )
         self.mixture = PriorMixture(
             columns=(SCALE, CURRENT_X, CURRENT_Y),
             mean=np.array([dvl.scale, 0.0, 0.0]),
             widest=components[-1].deviations,
-            told=np.array([np.inf, doubt.current_told, doubt.current_told]),
-            walks=np.array([doubt.scale_walk, doubt.current_walk, doubt.current_walk]),
+            told=np.array([np.inf, _CURRENT_TOLD, _CURRENT_TOLD]),
+            walks=np.array([_SCALE_WALK, _CURRENT_WALK, _CURRENT_WALK]),
             components=components,
-            rival=PriorComponent("DVL", doubt.dvl_share, np.array([dvl.scale_deviation, still, still])),
+            rival=PriorComponent("DVL", _DVL_SHARE, np.array([dvl.scale_deviation, *still])),
         )

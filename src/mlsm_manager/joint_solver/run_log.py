@@ -129,7 +129,8 @@ class RunLog:
         if scan.reference_time <= newest:
             text = f"ends at {scan.reference_time:.3f} s, the one before at {newest:.3f} s"
             raise RefusedInput("scans out of order", text)
-        self._scans.extend(np.array([(len(self.odometry), len(scan.points), sights.echo_count, False)], _SCAN))
+        echoes = (1.0 / sights.per_echo).sum()
+        self._scans.extend(np.array([(len(self.odometry), len(scan.points), echoes, False)], _SCAN))
         self._node_times.extend([scan.reference_time])
         self.odometry.extend(scan.track, scan.reference_time + lookahead)
         self.surfaces.append(points)

@@ -103,15 +103,12 @@ class Fix:
         return cls(np.linalg.pinv(information) @ (of_both @ place - of_prior @ expected), information)
 
 
-@dataclass
-class Fixes:
+class Fixes(Dict[int, Fix]):
     """Those of a run, by the node at the end of the scan."""
-
-    by_node: Dict[int, Fix] = field(default_factory=dict)
 
     def add(self, equations: NormalEquations, layout: Layout, poses: np.ndarray, corrections: np.ndarray) -> None:
         """Add those of the free nodes. poses: (n, 3) T_odom_base, corrections: (n, width), of these nodes."""
-        for node, fix in self.by_node.items():
+        for node, fix in self.items():
             if layout.first <= node <= layout.last:
                 row = node - layout.first
                 gradient = fix.information @ (poses[row, :YAW] + corrections[row, :YAW] - fix.place)
@@ -119,11 +116,10 @@ class Fixes:
                 equations.add_terms(columns[np.newaxis], fix.information[np.newaxis], gradient[np.newaxis])
 
     def stored(self) -> Dict[str, np.ndarray]:
-        fixes = self.by_node.values()
         return {
-            _NODES: np.array(list(self.by_node), dtype=np.int64),
-            _PLACES: np.array([fix.place for fix in fixes]).reshape(-1, YAW),
-            _INFORMATION: np.array([fix.information for fix in fixes]).reshape(-1, YAW, YAW),
+            _NODES: np.array(list(self), dtype=np.int64),
+            _PLACES: np.array([fix.place for fix in self.values()]).reshape(-1, YAW),
+            _INFORMATION: np.array([fix.information for fix in self.values()]).reshape(-1, YAW, YAW),
         }
 
     @classmethod

@@ -44,10 +44,6 @@ class Sights(NamedTuple):
         reach, per_echo = reaches(scan.times, bearings, ranges), points_per_echo(scan.times, ranges)
         return cls(places, ranges, bearings, reach, per_echo)
 
-    @property
-    def echo_count(self) -> float:
-        return float((1.0 / self.per_echo).sum())
-
 
 @dataclass(frozen=True)
 class SurfacePoints:

@@ -40,18 +40,6 @@ class Speeds:
     slip_correlation_time: float
 
 
-@dataclass(frozen=True)
-class TurnRates:
-    """How a vehicle turns that reports nothing.
-
-    turn_rate_deviation: rad/s. turn_rate_correlation_time: s. heading_walk: rad/sqrt(s), besides the turn rate.
-    """
-
-    turn_rate_deviation: float
-    turn_rate_correlation_time: float
-    heading_walk: float
-
-
 class HeadingFactors(OdometryModel):
     """Nodes have columns x, y, yaw, then in base_link the speeds ahead and aside, and the speed of travel [m/s].
 
@@ -166,20 +154,21 @@ class UnaidedFactors(HeadingFactors):
 
     width = 7
 
-    def __init__(self, speeds: Speeds, turn_rates: TurnRates) -> None:
+    def __init__(self, speeds: Speeds, deviation: float, correlation_time: float, heading_walk: float) -> None:
+        """Of the turn rate: deviation [rad/s], correlation_time [s]; heading_walk: rad/sqrt(s), besides it."""
         super().__init__(speeds, None)
-        self._own = turn_rates
+        self._deviation, self._correlation_time, self._heading_walk = deviation, correlation_time, heading_walk
 
     freed = None  # there is no compass that could be wrong
 
     def first_deviations(self) -> np.ndarray:
-        return np.append(super().first_deviations(), self._own.turn_rate_deviation)
+        return np.append(super().first_deviations(), self._deviation)
 
     def advanced(self, nodes: np.ndarray, motion: Motion) -> np.ndarray:
         durations = np.diff(motion.times)
         rate = nodes[:, TURN_RATE]
         half = nodes.copy()
-        later = np.exp(-durations / self._own.turn_rate_correlation_time) * rate
+        later = np.exp(-durations / self._correlation_time) * rate
         turn = (rate + later) / 2.0 * durations
         half[:, YAW] += turn / 2.0
         result = super().advanced(half, motion)
@@ -195,20 +184,20 @@ class UnaidedFactors(HeadingFactors):
 
     def fading(self, node: np.ndarray) -> Fading:
         known = super().fading(node)
-        return replace(known, times=np.append(known.times[:2], self._own.turn_rate_correlation_time))
+        return replace(known, times=np.append(known.times[:2], self._correlation_time))
 
     def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
-        kept = np.exp(-durations / self._own.turn_rate_correlation_time)
-        turn_rate = Change(kept, self._own.turn_rate_deviation**2 * (1.0 - kept**2))
+        kept = np.exp(-durations / self._correlation_time)
+        turn_rate = Change(kept, self._deviation**2 * (1.0 - kept**2))
         return {TURN_RATE: turn_rate, **super()._changes(durations)}
 
     def steps(self, nodes: np.ndarray, motion: Motion) -> List[Residuals]:
-        own, durations = self._own, np.diff(motion.times)
+        durations = np.diff(motion.times)
         columns = step_columns(nodes, self.width + YAW, YAW, self.width + TURN_RATE, TURN_RATE)
         one, half = np.ones(len(durations)), durations / 2.0
         residual = np.diff(nodes[:, YAW]) - half * (nodes[1:, TURN_RATE] + nodes[:-1, TURN_RATE])
-        short = np.minimum(durations**3 / (6.0 * own.turn_rate_correlation_time), durations**2)
-        weight = 1.0 / (own.turn_rate_deviation**2 * short + own.heading_walk**2 * durations)
+        short = np.minimum(durations**3 / (6.0 * self._correlation_time), durations**2)
+        weight = 1.0 / (self._deviation**2 * short + self._heading_walk**2 * durations)
         turn = Residuals(columns, np.column_stack([one, -one, -half, -half]), residual, weight)
         return [*super().steps(nodes, motion), turn]
 

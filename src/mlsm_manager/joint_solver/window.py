@@ -199,8 +199,7 @@ class Window:
         loops: that pull, as found at the unknowns `start`. Return the equations that were solved.
         """
         equations = self._expected()
-        if self._run.fixes.by_node:
-            self._run.fixes.add(equations, self._layout, self._motion.poses, self.state.nodes[self._layout.first :])
+        self._run.fixes.add(equations, self._layout, self._motion.poses, self.state.nodes[self._layout.first :])
         met = self._surfaces_met(cut)
         add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:

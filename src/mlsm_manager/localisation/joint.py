@@ -232,7 +232,7 @@ class Joint(Estimator):
     def _taken(self, scan: Scan, session: JointSession, start: float) -> ScanUpdate:
         """Go on with a run that has taken a scan; `start`: s, when it began to."""
         self.session = session
-        if session.solver.closed is not None or session.rivals.switched:
+        if session.solver.closed or session.rivals.switched:
             for drawn in self._maps:
                 drawn.redraw(session)
         self._maps.matched.add(MapCloud.of_scan(scan))

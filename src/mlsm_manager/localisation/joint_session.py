@@ -288,5 +288,4 @@ def update_of(scan: Scan, session: JointSession, belief: Belief, seconds: float)
         error=float(np.average([part.distance for part in parts], weights=points)), points_used=sum(points),
         seconds=seconds, beam_times=times, beam_poses=session.path(times),
     )  # fmt: skip
-    loop = "" if solver.closed is None else solver.closed.line()
-    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=loop)
+    return ScanUpdate(scan, result, True, belief, solver.found, session.is_provisional, loop=solver.closed)

@@ -3,24 +3,17 @@
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import lru_cache
-from typing import Any, Callable, Dict, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Mapping, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import Compass, OdometryModel
-from mlsm_manager.joint_solver.parameters import NodeSearch
-from mlsm_manager.joint_solver.position_models import (
-    DvlFactors,
-    OdometryDoubt,
-    PositionOdometry,
-    ThrusterFactors,
-    UnsureFactors,
-)
+from mlsm_manager.joint_solver.position_models import DvlFactors, PositionOdometry, ThrusterFactors, UnsureFactors
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
-from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
+from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, UnaidedFactors
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.files import package_folder
 from node_support.parameters import EXPERT, parameter, read_values
@@ -31,17 +24,6 @@ _NO_COMPASS = 1e-5
 # rad/sqrt(s): the solver needs some freedom of the heading from scan to scan; of an unknown turn rate, besides it.
 _LEAST_WALK = 1e-6
 _TURN_NOISE = 3.5e-4
-# Data sheets are usually right; the speed at a thrust is known to a third. Half the speed of a slow current are some
-# turns' worth of echoes.
-_DOUBT = OdometryDoubt(
-    dvl_share=0.8,
-    scale_deviation=0.3,
-    current_deviation=0.1,
-    no_current=0.003,
-    current_told=0.05,
-    scale_walk=0.1 / np.sqrt(600.0),
-    current_walk=0.002,
-)
 
 
 class OdometryKind(Enum):
@@ -111,7 +93,7 @@ class OdometryChoice(OdometryErrors):
     def odometry_model(self) -> OdometryModel:
         return _MODELS[self.odometry](self)
 
-    def node_search(self, parts_per_turn: int) -> Optional[NodeSearch]:
+    def node_search(self, parts_per_turn: int) -> Any:
         """Return what finds the nodes of parts of a turn, of which echoes alone tell; None where it is not needed."""
         if parts_per_turn == 1 or self.odometry not in COMPASS_ONLY:
             return None
@@ -166,11 +148,11 @@ def _heading(own: OdometryChoice) -> OdometryModel:
 
 def _none(own: OdometryChoice) -> OdometryModel:
     deviation = max(own.turn_rate_deviation, 1e-5)
-    return UnaidedFactors(_speeds(own), TurnRates(deviation, own.turn_rate_correlation_time, _TURN_NOISE))
+    return UnaidedFactors(_speeds(own), deviation, own.turn_rate_correlation_time, _TURN_NOISE)
 
 
 _MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {
-    OdometryKind.AUTO: lambda own: UnsureFactors(_positions(own), _DOUBT),
+    OdometryKind.AUTO: lambda own: UnsureFactors(_positions(own)),
     OdometryKind.DVL: lambda own: DvlFactors(_positions(own)),
     OdometryKind.THRUSTERS: _thrusters,
     OdometryKind.HEADING: _heading,

@@ -9,7 +9,7 @@ slope is the velocity that is missing (figures 6.6 to 6.8).
 
 import time
 from dataclasses import dataclass, replace
-from typing import List, NamedTuple, Optional, Tuple
+from typing import NamedTuple, Optional, Tuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,9 +29,11 @@ class ClosestBlocks:
 
     def __init__(self, blocks: Blocks) -> None:
         self._blocks = blocks
-        cells, self._cell_of_block = np.unique(blocks.cells, axis=0, return_inverse=True)
+        cells, cell_of_block, sizes = np.unique(blocks.cells, axis=0, return_inverse=True, return_counts=True)
         self._tree = cKDTree((cells + 0.5) * blocks.resolution)
-        self._members = _padded_members(self._cell_of_block.reshape(-1), len(cells))
+        # The blocks of each cell, -1 where it has fewer than others.
+        self._members = np.full((len(cells), int(sizes.max())), -1, dtype=np.int64)
+        self._members[members(sizes)] = np.argsort(cell_of_block.reshape(-1), kind="stable")
 
     def find(self, points: np.ndarray) -> np.ndarray:
         """Return (...) indices of the blocks closest to points (..., 3): of the nearest cell, the nearest in height."""
@@ -97,7 +99,8 @@ def translate_segments(
     translations = np.zeros((len(times), 2))
     slope = np.zeros(2)
     last: Optional[np.ndarray] = None
-    for first, end in _runs(moving):
+    changes = np.flatnonzero(np.diff(moving)) + 1
+    for first, end in zip([0, *changes], [*changes, len(moving)]):
         part, chosen = slice(first, end), counted[first:end]
         if not chosen.any():
             translations[part] = 0.0 if last is None else last
@@ -112,13 +115,6 @@ def translate_segments(
     return translations, slope
 
 
-def _runs(moving: np.ndarray) -> List[Tuple[int, int]]:
-    """Return the first index and the end of each run of equal values."""
-    changes = np.flatnonzero(np.diff(moving.astype(np.int8))) + 1
-    bounds = np.concatenate([[0], changes, [len(moving)]])
-    return list(zip(bounds[:-1], bounds[1:]))
-
-
 def _line(since: np.ndarray, errors: np.ndarray, start: Optional[np.ndarray]) -> Tuple[np.ndarray, np.ndarray]:
     """Return offset (2,) and slope (2,) by least squares; the line begins at `start` (2,) where that is known."""
     if np.unique(since).size < _FEWEST_TIMES:
@@ -128,16 +124,6 @@ def _line(since: np.ndarray, errors: np.ndarray, start: Optional[np.ndarray]) ->
     centered = since - since.mean()
     slope = centered @ errors / (centered @ centered)
     return errors.mean(axis=0) - since.mean() * slope, slope
-
-
-def _padded_members(cell_of_block: np.ndarray, cells: int) -> np.ndarray:
-    """Return (cells, k) block indices, -1 where a cell has fewer than k."""
-    order = np.argsort(cell_of_block, kind="stable")
-    sizes = np.bincount(cell_of_block, minlength=cells)
-    cell, rank = members(sizes)
-    padded = np.full((cells, int(sizes.max())), -1, dtype=np.int64)
-    padded[cell, rank] = order
-    return padded
 
 
 _FEWEST_POINTS = 3  # the same as a line through times needs

@@ -13,7 +13,7 @@ from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.position_models import DvlFactors, PositionOdometry, ThrusterFactors
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, TurnRates, UnaidedFactors
+from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, UnaidedFactors
 
 COMPASS = Compass(heading_deviation=0.01745, heading_correlation_time=300.0, heading_walk=0.00035)
 DVL_ODOMETRY = PositionOdometry(
@@ -30,7 +30,7 @@ SPEEDS = Speeds(
 
 DVL, THRUSTERS = DvlFactors(DVL_ODOMETRY), ThrusterFactors(THRUSTER_ODOMETRY)
 HEADING = HeadingFactors(SPEEDS, COMPASS)
-UNAIDED = UnaidedFactors(SPEEDS, TurnRates(0.05, 10.0, 0.00035))
+UNAIDED = UnaidedFactors(SPEEDS, deviation=0.05, correlation_time=10.0, heading_walk=0.00035)
 
 
 def solver_parameters(**values):

@@ -32,7 +32,7 @@ def localised(**changes):
 
 def test_while_the_scale_is_hardly_known_scans_are_found_from_the_second_on():
     off, rivals = localised(odometry=OdometryKind.AUTO)
-    assert 2 in rivals.shown.fixes.by_node
+    assert 2 in rivals.shown.fixes
     assert off[1:].max() < 0.3
 
 
@@ -44,7 +44,7 @@ def test_where_a_scan_was_found_both_odometries_lead_to_it():
 
 def test_where_the_scale_is_known_no_scan_is_searched():
     _, rivals = localised(odometry=OdometryKind.DVL)
-    assert not rivals.shown.fixes.by_node
+    assert not rivals.shown.fixes
 
 
 @pytest.mark.parametrize(("metres", "is_found"), [(0.0, True), (1.0, False)])
@@ -57,7 +57,7 @@ def test_in_a_map_whose_newest_scans_are_uncertain_no_scan_is_searched(metres, i
     covariance = estimates[-1].covariance + metres**2 * np.eye(len(estimates[-1].covariance))
     estimates[-1] = replace(estimates[-1], covariance=covariance)
     localiser.take_scan(newest)
-    assert (4 in localiser.estimator.session.solver.fixes.by_node) == is_found
+    assert (4 in localiser.estimator.session.solver.fixes) == is_found
 
 
 def test_a_fix_is_what_the_scan_says_and_not_what_was_expected():
@@ -73,6 +73,6 @@ def test_a_fix_is_what_the_scan_says_and_not_what_was_expected():
 def test_fixes_are_stored_and_taken_back():
     fixes = Fixes({3: Fix(np.arange(2.0), np.eye(2)), 7: Fix(np.ones(2), 2.0 * np.eye(2))})
     again = Fixes.of_arrays(fixes.stored())
-    assert list(again.by_node) == [3, 7]
-    np.testing.assert_array_equal(again.by_node[7].information, 2.0 * np.eye(2))
+    assert list(again) == [3, 7]
+    np.testing.assert_array_equal(again[7].information, 2.0 * np.eye(2))
     assert Fixes.of_arrays(Fixes().stored()) == Fixes()

@@ -60,7 +60,7 @@ def test_live_follows_a_vehicle_whose_odometry_goes_astray(made, ends, path):
 
 def test_direction_and_delay_are_found(live, batch):
     assert live.estimates[-1].node[DIRECTION] == pytest.approx(DIRECTION_ERROR, abs=0.03)
-    assert live.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.2)
+    assert live.estimates[-1].run[DELAY] == pytest.approx(LATE, abs=0.2)
     assert batch.state.run[DELAY] == pytest.approx(LATE, abs=0.2)
 
 
@@ -85,7 +85,7 @@ def test_the_frozen_map_s_own_error_counts_in_the_place_and_in_the_calibration(m
 def test_a_delay_that_an_earlier_mission_was_too_sure_of_is_found_all_the_same(made):
     wrong = solver_parameters(sonar_delay=LATE - 1.0, sonar_delay_deviation=0.1, free_scans=4)
     solver = followed(made.scans, wrong)
-    assert solver.estimates[-1].sonar_delay == pytest.approx(LATE, abs=0.3)
+    assert solver.estimates[-1].run[DELAY] == pytest.approx(LATE, abs=0.3)
 
 
 def test_the_same_scans_give_the_same_bytes(made, live, batch):
