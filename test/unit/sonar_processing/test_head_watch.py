@@ -46,10 +46,6 @@ def test_lost_beams_are_counted(lost):
         assert events_of(steps) == Counter({HeadEvent.LOST: len(lost)})
 
 
-def test_a_change_of_step_is_no_loss_of_beams():
-    assert events_of([*range(100), *range(100, 300, 3)]) == Counter({HeadEvent.STEP_CHANGED: 1})
-
-
 def test_a_change_of_sector_is_noticed():
     found = events_of([*sweeps(-60, 60, 6), *sweeps(-20, 20, 6)])
     assert found[HeadEvent.SECTOR_CHANGED] >= 1
@@ -61,5 +57,6 @@ def test_a_sector_after_whole_turns_and_whole_turns_after_a_sector_are_noticed()
     assert events_of([*sweeps(-60, 60, 4), *range(-60, 800, 2)])[HeadEvent.SECTOR_CHANGED] >= 1
 
 
-def test_a_change_of_range_is_noticed():
+def test_a_change_of_step_or_range_is_noticed_and_no_loss_of_beams():
+    assert events_of([*range(100), *range(100, 300, 3)]) == Counter({HeadEvent.STEP_CHANGED: 1})
     assert events_of(range(6), bins=[3, 3, 5, 5, 3, 3]) == Counter({HeadEvent.RANGE_CHANGED: 2})

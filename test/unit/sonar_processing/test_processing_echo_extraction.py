@@ -76,24 +76,17 @@ def test_an_echo_is_found_between_the_bins():
     np.testing.assert_allclose(echoes.bins, WALL, atol=0.03)
 
 
-def test_speckle_leaves_the_wall():
-    echoes = _echoes(with_speckle(wall_image(WALL), seed=1), **STRONG_ONLY)
-    assert echoes.beams.tolist() == list(range(BEAMS))
-    np.testing.assert_allclose(echoes.bins, WALL, atol=1.5)
-
-
-def test_the_ring_of_the_floor_is_no_echo():
-    echoes = _echoes(with_speckle(with_ring(wall_image(WALL), at=80), seed=2))
-    assert len(echoes) == BEAMS
-    assert np.abs(echoes.bins - WALL[echoes.beams]).max() < 2.0
-
-
-@pytest.mark.parametrize("share", [0.0, 0.05])
-def test_the_ring_of_the_floor_is_no_echo_where_the_hull_hides_half_of_the_circle(share):
-    image = with_speckle(with_ring(wall_image(WALL), at=80), seed=2)
-    image[BEAMS // 2 :] *= share
+@pytest.mark.parametrize(
+    ("image", "share_behind_the_hull"),
+    [(wall_image(WALL), None), *((with_ring(wall_image(WALL), at=80), share) for share in (None, 0.0, 0.05))],
+)
+def test_speckle_and_the_ring_of_the_floor_leave_the_wall_also_where_the_hull_hides_half(image, share_behind_the_hull):
+    image, heard = with_speckle(image, seed=2), BEAMS
+    if share_behind_the_hull is not None:
+        heard = BEAMS // 2
+        image[heard:] *= share_behind_the_hull
     echoes = _echoes(image, **STRONG_ONLY)
-    assert set(echoes.beams) == set(range(BEAMS // 2))
+    assert set(echoes.beams) == set(range(heard))
     assert np.abs(echoes.bins - WALL[echoes.beams]).max() < 2.0
 
 
@@ -134,10 +127,11 @@ def test_contrast_keeps_echoes_out_of_a_scan_of_speckle_alone():
     assert np.median(high) < 60
 
 
-def test_a_scan_of_nothing_has_no_echo():
-    parameters = EchoExtractorParameters(**PEAKS, min_height=2.0)
-    echoes, threshold = extract_echoes(np.zeros((BEAMS, 400), np.uint8), RESOLUTION, parameters)
-    assert (len(echoes), threshold) == (0, 2.0)
+def test_a_scan_of_nothing_and_echoes_lower_than_min_height_give_none():
+    parameters = EchoExtractorParameters(**PEAKS, min_height=30.0)
+    for image in (np.zeros((BEAMS, 400), np.uint8), wall_image(WALL, height=20.0)):
+        echoes, threshold = extract_echoes(image, RESOLUTION, parameters)
+        assert (len(echoes), threshold) == (0, 30.0)
 
 
 def test_a_smaller_share_of_the_threshold_keeps_a_weak_wall_beside_a_strong_one():
@@ -145,10 +139,6 @@ def test_a_smaller_share_of_the_threshold_keeps_a_weak_wall_beside_a_strong_one(
     image = wall_image(WALL, height=1.0) * heights
     assert len(_echoes(image, threshold_share=1.0)) == BEAMS // 2
     assert len(_echoes(image, threshold_share=0.5)) == BEAMS
-
-
-def test_echoes_lower_than_min_height_are_none():
-    assert len(_echoes(wall_image(WALL, height=20.0), min_height=30.0)) == 0
 
 
 def test_binary_strengths_give_one_echo_per_run_in_its_middle():
@@ -209,13 +199,10 @@ def test_the_order_of_the_beams_makes_no_difference():
     np.testing.assert_array_equal(np.sort(there.bins), np.sort(back.bins))
 
 
-def test_too_few_beams_show_no_ring():
+def test_too_few_beams_show_no_ring_and_are_enough_where_none_is_taken_off():
     with pytest.raises(RefusedInput, match=r"^5, must be at least 6") as refused:
         _echoes(wall_image(WALL[:5]))
     assert refused.value.kind == "scans of too few beams"
-
-
-def test_few_beams_are_enough_where_no_ring_is_taken_off():
     assert len(_echoes(wall_image(WALL[:2]), ring_quantile=0.0)) == 2
 
 

@@ -63,18 +63,13 @@ def _seen_circle(center, radius):
     return units * (1.0 - range_differences(units, np.zeros_like(units), center, radius, width))[:, np.newaxis]
 
 
-def test_bins_of_one_beam_make_one_echo_at_their_middle():
-    cloud = _cloud([[9.9, 0.0], [10.0, 0.0], [10.1, 0.0], [20.0, 0.0], [0.0, 5.0]], stamps=[-1, -1, -1, -1, -2])
-    echoes = beam_echoes(cloud, gap=0.5)
-    np.testing.assert_allclose(echoes.points, [[10.0, 0.0], [20.0, 0.0], [0.0, 5.0]], atol=1e-5)
-    assert echoes.weights.tolist() == [3, 1, 1]
-    assert echoes.owner.tolist() == [0, 0, 0, 1, 2]
+def test_bins_of_one_beam_make_one_echo_at_their_middle_where_strong_ones_weigh_more():
+    xy, strengths = [[9.9, 0.0], [10.0, 0.0], [20.0, 0.0], [0.0, 5.0]], [30.0, 90.0, 50.0, 50.0]
+    echoes = beam_echoes(_cloud(xy, stamps=[-1, -1, -1, -2], strengths=strengths), gap=0.5)
+    np.testing.assert_allclose(echoes.points, [[9.975, 0.0], [20.0, 0.0], [0.0, 5.0]], atol=1e-5)
+    assert echoes.weights.tolist() == [2, 1, 1]
+    assert echoes.owner.tolist() == [0, 0, 1, 2]
     assert echoes.time_stamps.tolist() == [1, 1, 2]
-
-
-def test_strong_bins_weigh_more_in_an_echo():
-    cloud = _cloud([[10.0, 0.0], [10.1, 0.0]], stamps=[1, 1], strengths=[30.0, 90.0])
-    assert beam_echoes(cloud, gap=0.5).points[0, 0] == pytest.approx(10.075, abs=1e-4)
 
 
 def test_the_search_may_end_sooner_when_more_samples_are_good():
@@ -133,17 +128,12 @@ def test_few_points_and_points_in_one_place_are_neither_walls_nor_circles(xy):
     assert _circles(_cloud(xy)) == []
 
 
-def test_when_the_points_left_are_one_wall_the_search_ends():
-    lines = _lines(_cloud(_wall(0, 12, 0.0, 40)), n_walls=10)
-    assert len(lines) == 1
-
-
-def test_points_that_are_not_finite_are_left_out():
+def test_the_search_ends_when_no_points_are_left_and_those_that_are_not_finite_are_left_out():
     cloud = _cloud(_wall(0, 12, 0.0, 40))
     cloud.points[::5, 1] = np.nan
-    (line,) = _lines(cloud)
+    (line,) = _lines(cloud, n_walls=10)
+    assert line.members.tolist() == [number for number in range(40) if number % 5]
     assert line.echoes == 32
-    assert not set(line.members) & set(range(0, 40, 5))
 
 
 @pytest.mark.parametrize("center", [(10.0, 0.0), (-6.0, 8.0), (0.0, -15.0)])
@@ -199,15 +189,12 @@ def _seen(ranges, weights=None, lengths=None):
     return Sightings(points, np.zeros((count, 2)), np.arange(count), weights, lengths, STEP)
 
 
-def test_a_thing_far_from_all_echoes_is_alone():
-    seen = _seen([10.0, 10.0, 14.0])
-    assert is_alone(seen.only([0, 1]), seen.only([2]), NOTHING, clearance=0.7)
-
-
-@pytest.mark.parametrize("clearance", [0.1, 1.0])
-def test_an_echo_within_the_clearance_or_in_the_next_beam_is_company(clearance):
-    seen = _seen([10.0, 10.0, 10.1])
-    assert not is_alone(seen.only([0, 1]), seen.only([2]), NOTHING, clearance)
+@pytest.mark.parametrize(
+    ("other", "clearance", "expected"), [(14.0, 0.7, True), (10.1, 0.1, False), (10.1, 1.0, False)]
+)
+def test_an_echo_within_the_clearance_or_in_the_next_beam_is_company(other, clearance, expected):
+    seen = _seen([10.0, 10.0, other])
+    assert is_alone(seen.only([0, 1]), seen.only([2]), NOTHING, clearance) == expected
 
 
 @pytest.mark.parametrize(("weight", "expected"), [(2, True), (3, False)])
@@ -225,15 +212,10 @@ def test_one_beam_that_meets_a_thing_twice_is_not_oblique():
     assert not is_oblique(replace(_seen([10.0, 10.2]), points=np.array([[10.0, 0.0], [10.2, 0.0]])))
 
 
-@pytest.mark.parametrize(("length", "expected"), [(0.3, False), (1.0, True)])
-def test_echoes_with_holes_between_their_bins_are_scattered(length, expected):
-    usual = _seen([10.0] * 9)
-    assert is_scattered(_seen([10.0, 10.0], weights=[4, 4], lengths=[length, length]), usual) == expected
-
-
-def test_echoes_of_one_point_each_are_never_scattered():
-    single = _seen([10.0, 10.0], weights=[1, 1])
-    assert not is_scattered(single, single)
+@pytest.mark.parametrize(("weight", "length", "expected"), [(4, 0.3, False), (4, 1.0, True), (1, 0.0, False)])
+def test_echoes_with_holes_between_their_bins_are_scattered(weight, length, expected):
+    group = _seen([10.0, 10.0], weights=[weight] * 2, lengths=[length] * 2)
+    assert is_scattered(group, group if weight == 1 else _seen([10.0] * 9)) == expected
 
 
 def test_the_footprint_is_what_two_neighbouring_beams_cover():
