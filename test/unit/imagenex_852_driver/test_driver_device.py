@@ -55,22 +55,16 @@ def test_of_two_replies_that_a_stall_heaped_up_the_newer_is_the_answer(wait):
     assert (wait.reply, wait.unexpected_replies) == (REPLY, 1)
 
 
-def test_silence_ends_the_wait_after_the_margin(wait):
-    assert not wait.over(BEGINS + 0.24, pending=False)
-    assert wait.over(BEGINS + 0.26, pending=False)
-    assert not wait.answer_bytes
-
-
-def test_a_gap_within_a_reply_ends_the_wait(wait):
-    wait.take(bytes(100), [], BEGINS + 0.01)
-    assert not wait.over(BEGINS + 0.10, pending=True)
-    assert wait.over(BEGINS + 0.12, pending=True)
-    assert wait.answer_bytes
-
-
-def test_enough_bytes_without_a_reply_end_the_wait_at_once(wait):
-    wait.take(bytes(513), [], BEGINS + 0.05)
-    assert wait.over(BEGINS + 0.05, pending=False)
+@pytest.mark.parametrize(
+    ("received", "pending", "goes_on_at", "over_at"),
+    [(0, False, 0.24, 0.26), (100, True, 0.10, 0.12), (513, False, None, 0.01)],
+    ids=["silence longer than the margin", "gap within a reply", "enough bytes without a reply"],
+)
+def test_the_wait_ends_when_no_reply_can_come_any_more(wait, received, pending, goes_on_at, over_at):
+    wait.take(bytes(received), [], BEGINS + 0.01)
+    assert goes_on_at is None or not wait.over(BEGINS + goes_on_at, pending)
+    assert wait.over(BEGINS + over_at, pending)
+    assert wait.answer_bytes == received
 
 
 def test_noise_without_end_does_not_hold_the_wait_for_ever(wait):
@@ -96,19 +90,11 @@ def device(faults):
     return VirtualScan(IMAGENEX_852, faults=faults).device
 
 
-def test_a_ping_brings_the_reply_to_its_command(device):
+def test_a_ping_brings_the_reply_to_its_command_and_leaves_when_its_last_byte_has(device):
     ping = device.ping(COMMAND)
     assert (ping.command, ping.reply.kind, ping.reply.max_range) == (COMMAND, ReplyKind.IGX, 50)
+    assert ping.stamp == pytest.approx(EPOCH + 27 * 10 / 1152000)
     assert device.stats.replies == 1
-
-
-def test_the_stamp_is_when_the_last_byte_of_the_command_left(device):
-    assert device.ping(COMMAND).stamp == pytest.approx(EPOCH + 27 * 10 / 1152000)
-
-
-def test_the_next_command_may_ask_for_something_else(device):
-    device.ping(COMMAND)
-    assert device.ping(SwitchCommand(max_range=20, data_points=250)).reply.kind is ReplyKind.IMX
 
 
 @pytest.mark.parametrize(
@@ -126,11 +112,6 @@ def test_a_reply_that_does_not_come_in_time_is_a_timeout_and_a_spoilt_one_is_bad
     assert device.ping(COMMAND) is None
     assert getattr(device.stats, count) == device.stats.timeouts + device.stats.bad_frames == 1
     assert told in device.stats.last_error
-
-
-def test_the_overrun_of_a_reply_is_handed_on(device, faults):
-    faults.order(Fault.OVERRUN)
-    assert device.ping(COMMAND).reply.overrun
 
 
 class FixedReplyHead(Emulated852):
@@ -214,9 +195,10 @@ def positions(pings):
 def test_new_settings_take_effect_at_the_next_ping():
     scan = VirtualScan(IMAGENEX_852)
     scan.beams(2)
-    scan.settings = HeadSettings(max_range=20, direction=Direction.COUNTERCLOCKWISE)
+    scan.settings = HeadSettings(max_range=20, data_points=250, direction=Direction.COUNTERCLOCKWISE)
     scan.beams(2)
     assert [ping.reply.max_range for ping in scan.pings] == [50, 50, 20, 20]
+    assert [ping.reply.kind.name for ping in scan.pings] == ["IGX", "IGX", "IMX", "IMX"]
     assert positions(scan.pings) == [1400, 1420, 1440, 1420]
 
 

@@ -1,7 +1,6 @@
 import pytest
 
 from node_support.parameters import ParameterError
-from ping360_driver.emulated_ping360 import EmulatorParameters
 from ping360_driver.parameters import DriverParameters, HeadSettings
 from ping360_driver.scan_command import ScanCommand, SectorWalk
 
@@ -16,7 +15,6 @@ from ping360_driver.scan_command import ScanCommand, SectorWalk
         ({"sector_width_deg": 1.8, "step_gradians": 10}, "narrower than step_gradians = 10"),
         ({"step_gradians": 11}, "step_gradians = 11: must be an integer from 1 to 10"),
         ({"scan_mode": "by_hand"}, "must be one of auto_transmit, request"),
-        ({"back_off_first": 0.9, "back_off_longest": 0.5}, "longer than back_off_longest"),
     ],
 )
 def test_what_line_or_head_cannot_do_is_refused(values, complaint):
@@ -30,19 +28,14 @@ def test_line_and_frame_cannot_be_changed_while_the_driver_runs():
     assert names.isdisjoint({"port", "baud_rate", "frame_id"})
 
 
-def test_the_default_port_may_be_a_network_address():
-    assert EmulatorParameters().link == "/tmp/ping360"
-    assert "udp://" in EmulatorParameters.__dataclass_fields__["link"].metadata["parameter"].text
-
-
-def test_without_a_sector_the_whole_turn_is_scanned():
-    command = HeadSettings().command()
-    assert (command.start, command.stop, command.step, command.is_full_turn) == (0, 399, 1, True)
-
-
-def test_a_sector_is_centred_clockwise_from_ahead():
-    command = HeadSettings(train_angle_deg=90.0, sector_width_deg=90.0).command()
-    assert (command.start, command.stop) == (250, 350)
+@pytest.mark.parametrize(
+    ("sector", "start", "stop"),
+    [({}, 0, 399), ({"train_angle_deg": 90.0, "sector_width_deg": 90.0}, 250, 350)],
+    ids=["whole turn", "clockwise from ahead"],
+)
+def test_a_sector_is_centred_clockwise_from_ahead_and_usually_the_whole_turn(sector, start, stop):
+    command = HeadSettings(**sector).command()
+    assert (command.start, command.stop, command.step, command.is_full_turn) == (start, stop, 1, not sector)
 
 
 @pytest.mark.parametrize(

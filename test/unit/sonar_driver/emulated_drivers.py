@@ -50,10 +50,6 @@ class Sonar:
     good: Tuple[Fault, ...]
     optional: Tuple[Fault, ...] = ()
 
-    def connection_to(self, port, **changes):
-        """Return the parameters of a fast line."""
-        return replace(self.connection, port=port, **changes)
-
     def emulated(self, connection, faults=None, echoes=None, head=None, **told):
         """Return a head on a line; `head` is another class of it, `told` are other parameters than the line's."""
         line = {"baud_rate": connection.baud_rate, "speed_of_sound": getattr(connection, "speed_of_sound", 1500.0)}
@@ -175,11 +171,6 @@ class Scanning:
             self._news.notify_all()
 
 
-def served_line(port):
-    """Return the head's end of a port."""
-    return UdpLine(*datagram_address(port)) if is_datagram_port(port) else PtyLine(port)
-
-
 class HideableServer(HeadServer):
     """A server whose line can be taken away and brought back; both are done when the methods return."""
 
@@ -201,8 +192,10 @@ class HideableServer(HeadServer):
 @contextmanager
 def served(sonar, port, head=None, **changes):
     """Yield the server of an emulated head, and the parameters to connect to it."""
-    connection = sonar.connection_to(str(port), **changes)
-    with HideableServer(head or sonar.emulated(connection), served_line(connection.port)) as server:
+    connection = replace(sonar.connection, port=str(port), **changes)
+    name = connection.port
+    line = UdpLine(*datagram_address(name)) if is_datagram_port(name) else PtyLine(name)
+    with HideableServer(head or sonar.emulated(connection), line) as server:
         yield server, connection
 
 
@@ -232,7 +225,7 @@ class VirtualScan:
         self.echoes = NumberedEchoes()
         stop = stop or VirtualStop(VirtualTime())
         self.time = stop.time
-        connection = sonar.connection_to(port, **{**EXACT, **changes})
+        connection = replace(sonar.connection, port=port, **{**EXACT, **changes})
         self.head = sonar.emulated(connection, faults, self.echoes, head, **dict(told))
         baud_rate = math.inf if is_datagram_port(port) else connection.baud_rate
         line = VirtualLine(self.head, baud_rate, stop.time)
