@@ -26,15 +26,22 @@ def _write(tmp_path, script, name="out.bag", *arguments):
     return out
 
 
+@pytest.fixture(scope="module")
+def bag(tmp_path_factory):
+    """Return the bag of the script."""
+    folder = tmp_path_factory.mktemp("bag")
+    (folder / "script.yaml").write_text(SCRIPT)
+    return _write(folder, folder / "script.yaml", "out.bag", "--set", "odometry.scale_error=0.25", "seed=9")
+
+
 def _messages(path, topic):
     with rosbag.Bag(str(path)) as bag:
         return [(message, stamp) for _, message, stamp in bag.read_messages([topic])]
 
 
-def test_a_bag_holds_beams_tf_odometry_and_truth(tmp_path, script):
-    out = _write(tmp_path, script)
-    with rosbag.Bag(str(out)) as bag:
-        counts = {topic: info.message_count for topic, info in bag.get_type_and_topic_info()[1].items()}
+def test_a_bag_holds_beams_tf_odometry_and_truth(bag):
+    with rosbag.Bag(str(bag)) as opened:
+        counts = {topic: info.message_count for topic, info in opened.get_type_and_topic_info()[1].items()}
     assert counts["/sonar/raw"] == 46
     assert counts["/odom"] == counts["/ground_truth"] == counts["/cmd_vel"] == 121
     assert counts["/tf"] == counts["/joint_states"] == 121 + 46 - 16
@@ -71,40 +78,36 @@ def test_without_instruments_the_odometry_stays_where_the_vehicle_starts(tmp_pat
     assert not _messages(out, "/cmd_vel")
 
 
-def test_every_beam_can_be_placed_at_its_own_stamp(tmp_path, script):
-    out = _write(tmp_path, script)
+def test_every_beam_can_be_placed_at_its_own_stamp(bag):
     placed = {
         message.transforms[0].header.stamp: {transform.child_frame_id for transform in message.transforms}
-        for message, _ in _messages(out, "/tf")
+        for message, _ in _messages(bag, "/tf")
     }
-    for beam, stamp in _messages(out, "/sonar/raw"):
+    for beam, stamp in _messages(bag, "/sonar/raw"):
         assert beam.header.stamp == stamp
         assert placed[stamp] == {"base_link", "sonar"}
 
 
-def test_the_truth_is_the_script_and_the_odometry_errs_as_asked(tmp_path, script):
-    out = _write(tmp_path, script, "out.bag", "--set", "odometry.scale_error=0.25")
-    last = [_messages(out, topic)[-1][0].pose.pose.position for topic in ("/ground_truth", "/odom")]
+def test_the_truth_is_the_script_and_the_odometry_errs_as_asked(bag, script):
+    last = [_messages(bag, topic)[-1][0].pose.pose.position for topic in ("/ground_truth", "/odom")]
     end = load_script(script).pose(6.0)[:2, 3]
     np.testing.assert_allclose([(p.x, p.y) for p in last], [end, end / 1.25], atol=1e-9)
 
 
-def test_the_servo_is_in_the_beams_the_joint_and_the_transform(tmp_path, script):
-    out = _write(tmp_path, script)
-    beam, joint = _messages(out, "/sonar/raw")[-1][0], _messages(out, "/joint_states")[-1][0]
-    mount = _messages(out, "/tf")[-1][0].transforms[1]
+def test_the_servo_is_in_the_beams_the_joint_and_the_transform(bag):
+    beam, joint = _messages(bag, "/sonar/raw")[-1][0], _messages(bag, "/joint_states")[-1][0]
+    mount = _messages(bag, "/tf")[-1][0].transforms[1]
     assert joint.name == ["sonar_servo_joint"]
     assert joint.position[0] == pytest.approx(np.radians(20.0))
     assert beam.sensorAngle == pytest.approx(np.radians(20.0))
     assert 2.0 * np.arcsin(mount.transform.rotation.y) == pytest.approx(np.radians(20.0))
 
 
-def test_a_bag_tells_how_it_was_made_and_nothing_of_the_machine(tmp_path, script):
-    out = _write(tmp_path, script, "out.bag", "--set", "seed=9")
-    told = yaml.safe_load(_messages(out, "/sonar_simulator/settings")[0][0].data)
+def test_a_bag_tells_how_it_was_made_and_nothing_of_the_machine(bag):
+    told = yaml.safe_load(_messages(bag, "/sonar_simulator/settings")[0][0].data)
     found = told["world"], told["script"], told["seed"], told["sonar"]["ray_rows"]
     assert found == ("basin.sdf", "script.yaml", 9, 5)
-    assert str(tmp_path).encode() not in out.read_bytes()
+    assert str(bag.parent).encode() not in bag.read_bytes()
 
 
 def test_parameters_come_from_a_file_and_set_overrides_them(tmp_path, script):

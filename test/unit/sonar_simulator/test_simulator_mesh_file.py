@@ -1,3 +1,4 @@
+import re
 import sys
 
 import numpy as np
@@ -31,22 +32,17 @@ def box():
     return trimesh.creation.box(extents=(1.0, 2.0, 3.0))
 
 
-@pytest.mark.parametrize("suffix", ["stl", "obj", "ply"])
-def test_a_mesh_without_unit_and_axis_is_metres_and_z_up(tmp_path, box, suffix):
-    path = tmp_path / f"box.{suffix}"
-    box.export(str(path))
-    vertices, faces = load_mesh(path)
+@pytest.mark.parametrize(
+    ("suffix", "size", "height"),
+    [("stl", (1, 2, 3), 0.0), ("obj", (1, 2, 3), 0.0), ("ply", (1, 2, 3), 0.0), ("glb", (1, 3, 2), 5.0)],
+)
+def test_a_mesh_without_unit_and_axis_is_metres_and_z_up_but_gltf_is_y_up(tmp_path, box, suffix, size, height):
+    box.apply_translation((0.0, height, 0.0))
+    box.export(str(tmp_path / f"box.{suffix}"))
+    vertices, faces = load_mesh(tmp_path / f"box.{suffix}")
     assert len(faces) == 12
-    np.testing.assert_allclose(np.ptp(vertices, axis=0), (1, 2, 3), rtol=1e-6)
-
-
-def test_gltf_is_y_up(tmp_path, box):
-    path = tmp_path / "box.glb"
-    box.apply_translation((0.0, 5.0, 0.0))
-    box.export(str(path))
-    vertices, _ = load_mesh(path)
-    np.testing.assert_allclose(np.ptp(vertices, axis=0), (1, 3, 2), rtol=1e-6)
-    np.testing.assert_allclose(vertices[:, 2].mean(), 5.0)
+    np.testing.assert_allclose(np.ptp(vertices, axis=0), size, rtol=1e-6)
+    np.testing.assert_allclose(vertices[:, 2].mean(), height, atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -78,18 +74,22 @@ def test_every_instance_of_a_scene_is_there(tmp_path, box):
     assert np.ptp(vertices[:, 0]) == pytest.approx(11.0)
 
 
-@pytest.mark.parametrize("suffix", ["dae", "stl", "obj", "ply", "glb"])
-@pytest.mark.parametrize("content", [b"", b"solid nonsense", b"\xff\xfe\x00nothing at all\x00" * 9])
-def test_a_file_that_is_no_mesh_is_refused_with_its_path(tmp_path, suffix, content):
-    path = tmp_path / f"odd.{suffix}"
-    path.write_bytes(content)
-    with pytest.raises(WorldError, match=rf"odd\.{suffix}"):
+@pytest.mark.parametrize(
+    ("name", "content", "reason"),
+    [
+        *((f"odd.{suffix}", content, "")
+          for suffix in ("dae", "stl", "obj", "ply", "glb")
+          for content in (b"", b"solid nonsense", b"\xff\xfe\x00nothing at all\x00" * 9)),
+        ("gone.stl", None, ""),
+        ("nan.obj", b"v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n", ": a vertex is not finite"),
+    ],
+)  # fmt: skip
+def test_a_file_that_is_no_mesh_is_refused_with_its_path(tmp_path, name, content, reason):
+    path = tmp_path / name
+    if content is not None:
+        path.write_bytes(content)
+    with pytest.raises(WorldError, match=re.escape(name) + reason):
         load_mesh(path)
-
-
-def test_a_missing_mesh_is_refused_with_its_path(tmp_path):
-    with pytest.raises(WorldError, match=r"gone\.stl"):
-        load_mesh(tmp_path / "gone.stl")
 
 
 @pytest.mark.parametrize(("suffix", "package"), [("stl", "trimesh"), ("dae", "trimesh"), ("dae", "collada")])
@@ -99,22 +99,8 @@ def test_without_the_reader_the_error_says_what_to_install(tmp_path, monkeypatch
         load_mesh(tmp_path / f"box.{suffix}")
 
 
-def test_a_vertex_that_is_not_finite_is_refused(tmp_path):
-    path = tmp_path / "nan.obj"
-    path.write_text("v 0 0 0\nv 1 0 nan\nv 0 1 0\nf 1 2 3\n")
-    with pytest.raises(WorldError, match=r"nan\.obj: a vertex is not finite"):
-        load_mesh(path)
-
-
 def test_a_bare_mesh_is_a_world(tmp_path, box):
     path = tmp_path / "wreck.stl"
     box.export(str(path))
     loaded = load_world(path)
     assert (loaded.name, loaded.warnings, len(loaded.faces)) == ("wreck", (), 12)
-
-
-def test_any_other_file_is_taken_for_sdf(tmp_path):
-    path = tmp_path / "some.world"
-    path.write_text("<robot/>")
-    with pytest.raises(WorldError, match="not an SDF file"):
-        load_world(path)

@@ -19,6 +19,7 @@ WAY = VehicleScript.from_yaml_data(
     ],
     START,
 )
+RESTING = VehicleState(WAY.pose(0.0), np.zeros(6), True)
 
 
 def _odometry(seed=0, **errors):
@@ -53,8 +54,7 @@ def test_odometry_gives_speeds_off_by_its_error_and_true_heave_and_turn_rates():
 
 def test_the_heading_drifts_at_the_rate_asked_for_also_while_the_vehicle_rests():
     odometry = _odometry(heading_drift_deg_per_minute=6.0)
-    resting = VehicleState(WAY.pose(0.0), np.zeros(6), True)
-    yaw = yaw_of(odometry.estimate(30.0, resting).T_odom_base)
+    yaw = yaw_of(odometry.estimate(30.0, RESTING).T_odom_base)
     assert math.degrees(yaw) == pytest.approx(20.0 + 3.0)
 
 
@@ -93,9 +93,8 @@ def test_the_noise_of_the_turn_rate_makes_the_heading_walk():
 
 def test_a_vehicle_that_rests_is_measured_to_rest():
     odometry = _odometry(speed_noise=0.5, turn_rate_noise_deg=5.0)
-    resting = VehicleState(WAY.pose(0.0), np.zeros(6), True)
     for time in np.arange(0.0, 5.0, 0.1):
-        estimate = odometry.estimate(time, resting)
+        estimate = odometry.estimate(time, RESTING)
         np.testing.assert_array_equal(estimate.twist, np.zeros(6))
         np.testing.assert_allclose(estimate.T_odom_base, WAY.pose(0.0), atol=1e-12)
 

@@ -78,26 +78,19 @@ def test_a_mesh_is_scaled_and_placed(load, tmp_path):
     np.testing.assert_allclose(vertices.max(axis=0), (12, 3, 4))
 
 
-@pytest.mark.parametrize("uri", ["file://{folder}/t.obj", "{folder}/t.obj", "model://m/t.obj", "../path/m/t.obj"])
-def test_a_mesh_is_found_by_every_kind_of_uri(load, model_file, uri):
+@pytest.mark.parametrize(
+    "uri", ["file://{folder}/t.obj", "{folder}/t.obj", "model://m/t.obj", "../path/m/t.obj", "package://boats/t.obj"]
+)
+def test_a_mesh_is_found_by_every_kind_of_uri(load, model_file, monkeypatch, uri):
     folder = model_file("m", "")
     (folder / "t.obj").write_text(TETRAHEDRON)
-    world = load(_collision(f"<geometry><mesh><uri>{uri.format(folder=folder)}</uri></mesh></geometry>"))
-    assert (world.warnings, len(world.faces)) == ((), 4)
-
-
-def test_a_mesh_is_found_in_a_ros_package(load, tmp_path, monkeypatch):
-    pytest.importorskip("rospkg")
-    package = tmp_path / "boats"
-    package.mkdir()
-    (package / "package.xml").write_text(
+    (folder / "package.xml").write_text(
         '<package format="2"><name>boats</name><version>1.0.0</version><description>d</description>'
         '<maintainer email="a@b.cd">m</maintainer><license>BSD</license></package>'
     )
-    (package / "t.obj").write_text(TETRAHEDRON)
-    monkeypatch.setenv("ROS_PACKAGE_PATH", str(package))
-    loaded = load(_collision("<geometry><mesh><uri>package://boats/t.obj</uri></mesh></geometry>"))
-    assert (loaded.warnings, len(loaded.faces)) == ((), 4)
+    monkeypatch.setenv("ROS_PACKAGE_PATH", str(folder))
+    world = load(_collision(f"<geometry><mesh><uri>{uri.format(folder=folder)}</uri></mesh></geometry>"))
+    assert (world.warnings, len(world.faces)) == ((), 4)
 
 
 @pytest.mark.parametrize(
@@ -171,17 +164,20 @@ def test_a_material_holds_for_what_is_inside(load):
     assert names == ["mud", "steel", "concrete"]
 
 
-def test_a_material_of_ones_own_has_properties_as_attributes(load):
-    own = '<sonar:material reflection="0.3" slope="0.02" lambert_db="-30" mirror="0.9">tiles</sonar:material>'
-    (shape,) = load(_collision(BOX, own)).shapes
-    found = [getattr(shape.material, name) for name in ("name", "reflection", "slope", "lambert_db", "mirror")]
-    assert found == ["tiles", 0.3, 0.02, -30.0, 0.9]
-
-
-@pytest.mark.parametrize(("retro", "reflection"), [("0.25", 0.25), ("0", MATERIALS["concrete"].reflection)])
-def test_laser_retro_is_a_reflection(load, retro, reflection):
-    (shape,) = load(_collision(BOX, f"<laser_retro>{retro}</laser_retro>")).shapes
-    assert shape.material.reflection == reflection
+@pytest.mark.parametrize(
+    ("element", "properties"),
+    [
+        (
+            '<sonar:material reflection="0.3" slope="0.02" lambert_db="-30" mirror="0.9">tiles</sonar:material>',
+            {"name": "tiles", "reflection": 0.3, "slope": 0.02, "lambert_db": -30.0, "mirror": 0.9},
+        ),
+        ("<laser_retro>0.25</laser_retro>", {"reflection": 0.25}),
+        ("<laser_retro>0</laser_retro>", vars(MATERIALS["concrete"])),
+    ],
+)
+def test_a_material_of_ones_own_has_properties_as_attributes_and_laser_retro_is_a_reflection(load, element, properties):
+    (shape,) = load(_collision(BOX, element)).shapes
+    assert {**vars(shape.material), **properties} == vars(shape.material)
 
 
 @pytest.mark.parametrize(

@@ -28,19 +28,12 @@ def _sonar(world, seed=0, pattern=PATTERN, **values):
     return Sonar(RayCaster(world), pattern, make_echo_model("laser_cone", values), np.random.default_rng(seed))
 
 
-def test_rays_stay_inside_the_opening():
-    rays = PATTERN.sample(20, np.random.default_rng(0))
-    assert rays.shape == (20, 500, 3)
+def test_rays_are_unit_vectors_one_in_every_stratum_of_the_opening():
+    (rays,) = PATTERN.sample(1, np.random.default_rng(0))
     np.testing.assert_allclose(np.linalg.norm(rays, axis=-1), 1.0)
-    assert np.abs(np.arcsin(rays[..., 2])).max() <= math.radians(11.0) + 1e-12
-    assert np.abs(np.arctan2(rays[..., 1], rays[..., 0])).max() <= math.radians(1.25) + 1e-12
-
-
-def test_every_stratum_holds_one_ray():
-    rays = PATTERN.sample(1, np.random.default_rng(0))[0]
     row = np.floor((np.degrees(np.arcsin(rays[:, 2])) / 22.0 + 0.5) * 50)
     column = np.floor((np.degrees(np.arctan2(rays[:, 1], rays[:, 0])) / 2.5 + 0.5) * 10)
-    assert len(set(zip(row, column))) == 500
+    assert set(zip(row, column)) == {(i, j) for i in range(50) for j in range(10)}
 
 
 def test_every_beam_has_a_jitter_of_its_own():
@@ -64,13 +57,6 @@ def test_a_tilted_sonar_looks_along_its_own_plane():
     down = pose_matrix((0, 0, 0), (0.0, math.pi / 2, 0.0))
     assert np.argmax(sonar.ping(down, 0.0) > 0) == pytest.approx(95, abs=1)
     assert not sonar.ping(pose_matrix((0, 0, 0)), 0.0).any()
-
-
-def test_a_single_ping_is_a_batch_of_one():
-    pose = pose_matrix((0, 0, -2))
-    np.testing.assert_array_equal(
-        _sonar(BASIN).ping(pose, 0.3), _sonar(BASIN).pings(pose[np.newaxis], np.array([0.3]))[0]
-    )
 
 
 def test_parameters_give_pattern_and_range_resolution():

@@ -12,26 +12,23 @@ FLOOR = Shape("floor", "box", pose_matrix((0, 0, -6)), (122.0, 52.0, 1.0))
 WALL = Shape("wall", "box", pose_matrix((60.5, 0, -2.5)), (1.0, 52.0, 6.0))
 
 
-def test_the_outline_of_a_wall_is_its_closed_rectangle():
-    (outline,) = World.from_shapes("w", [WALL]).outlines()
+def outline_of(kind, size, *pose):
+    (outline,) = World.from_shapes("w", [Shape("s", kind, pose_matrix(*pose), size)]).outlines()
+    return outline
+
+
+def test_the_outline_of_a_wall_is_its_closed_rectangle_and_the_floor_has_none():
+    (outline,) = World.from_shapes("w", [WALL, FLOOR]).outlines()
     assert outline.shape == (5, 2)
     np.testing.assert_array_equal(outline[0], outline[-1])
     assert {tuple(corner) for corner in outline} == {(60, -26), (60, 26), (61, -26), (61, 26)}
 
 
-def test_the_outline_of_a_buoy_is_a_circle():
-    (outline,) = World.from_shapes("w", [Shape("b", "cylinder", pose_matrix((3, 4, 0)), (0.5, 5.0))]).outlines()
-    np.testing.assert_allclose(np.hypot(outline[:, 0] - 3, outline[:, 1] - 4), 0.5)
-
-
-def test_a_lying_pipe_is_as_long_as_it_is_from_above():
-    pipe = Shape("p", "cylinder", pose_matrix((0, 0, 0), (0, np.pi / 2, 0)), (0.25, 8.0))
-    (outline,) = World.from_shapes("w", [pipe]).outlines()
-    np.testing.assert_allclose(np.ptp(outline, axis=0), (8.0, 0.5))
-
-
-def test_the_floor_has_no_outline():
-    assert World.from_shapes("w", [FLOOR]).outlines() == []
+def test_the_outline_of_a_buoy_is_a_circle_and_a_lying_pipe_is_as_long_as_from_above():
+    buoy = outline_of("cylinder", (0.5, 5.0), (3, 4, 0))
+    np.testing.assert_allclose(np.hypot(buoy[:, 0] - 3, buoy[:, 1] - 4), 0.5)
+    pipe = outline_of("cylinder", (0.25, 8.0), (0, 0, 0), (0, np.pi / 2, 0))
+    np.testing.assert_allclose(np.ptp(pipe, axis=0), (8.0, 0.5))
 
 
 def test_joined_faces_point_to_the_vertices_of_their_own_shape():
