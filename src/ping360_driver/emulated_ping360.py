@@ -1,6 +1,6 @@
 """A Ping360 in software: a state machine from messages to messages with the delays of motor, sound and line."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import List, Optional
 
 from node_support.parameters import parameter, with_defaults
@@ -23,6 +23,7 @@ from ping360_driver.scan_command import (
     bin_length,
     head_angle,
     longest_pulse_us,
+    pulse_of,
 )
 from sonar_driver.emulated_head import (
     EchoSource,
@@ -201,6 +202,5 @@ class EmulatedPing360(EmulatedHead):
 
 
 def _pulse(command: PingMessage) -> PulseSettings:
-    asked = {name: getattr(command, name) for name in PulseSettings.__dataclass_fields__}
-    longest = longest_pulse_us(command.sample_period)
-    return PulseSettings(**{**asked, "transmit_duration": min(asked["transmit_duration"], longest)})
+    asked = pulse_of(command)
+    return replace(asked, transmit_duration=min(asked.transmit_duration, longest_pulse_us(asked.sample_period)))

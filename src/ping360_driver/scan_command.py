@@ -106,22 +106,18 @@ class SectorWalk:
 
     def next(self, command: ScanCommand) -> int:
         """Return the angle of the next ping, in gradians from 0 to 399."""
-        self._last = self._following(command)
-        return self._last
-
-    def _following(self, command: ScanCommand) -> int:
-        if self._last is None:
-            return command.start
-        if command.is_full_turn:
-            return (self._last + command.step) % TURN
-        position = (self._last - command.start) % TURN
-        if position > command.width:
+        position = None if self._last is None else (self._last - command.start) % TURN
+        if position is None or (position > command.width and not command.is_full_turn):
             self._clockwise = True
-            return command.start
-        if position == (command.width if self._clockwise else 0):
-            self._clockwise = not self._clockwise
-        position += command.step if self._clockwise else -command.step
-        return (command.start + min(max(position, 0), command.width)) % TURN
+            self._last = command.start
+        elif command.is_full_turn:
+            self._last = (self._last + command.step) % TURN
+        else:
+            if position == (command.width if self._clockwise else 0):
+                self._clockwise = not self._clockwise
+            position += command.step if self._clockwise else -command.step
+            self._last = (command.start + min(max(position, 0), command.width)) % TURN
+        return self._last
 
 
 def head_angle(gradians: int, inverted: bool = False) -> float:
@@ -195,8 +191,11 @@ def beam(message: PingMessage) -> Beam:
         raise MessageError("sample_period = 0: must be positive")
     automatic = message.message_id == MessageId.AUTO_DEVICE_DATA
     sector = (message.start_angle, message.stop_angle, message.num_steps) if automatic else None
-    pulse = PulseSettings(**{name: getattr(message, name) for name in PulseSettings.__dataclass_fields__})
-    return Beam(message.angle, pulse, echoes, sector)
+    return Beam(message.angle, pulse_of(message), echoes, sector)
+
+
+def pulse_of(message: PingMessage) -> PulseSettings:
+    return PulseSettings(**{name: getattr(message, name) for name in PulseSettings.__dataclass_fields__})
 
 
 def firmware_of(message: PingMessage) -> Tuple[int, int, int]:

@@ -92,7 +92,14 @@ def load_mesh(path: Path, submesh: str = "") -> Mesh:
         if not parts:
             raise WorldError(f"{path}: no mesh {submesh!r} in it")
     vertices, faces = joined([(corners, triangles) for _, corners, triangles in parts])
-    return _checked(path, vertices @ _to_metres_z_up(path).T, faces)
+    vertices = vertices @ _to_metres_z_up(path).T
+    if not len(faces):
+        raise WorldError(f"{path}: no triangle in it")
+    if faces.max() >= len(vertices) or faces.min() < 0:
+        raise WorldError(f"{path}: a triangle names a vertex that is not there")
+    if not (np.abs(vertices) <= FARTHEST).all():
+        raise WorldError(f"{path}: a vertex is farther than {FARTHEST:g} m from the origin")
+    return vertices, faces
 
 
 def _parts(path: Path) -> List[Tuple[str, np.ndarray, np.ndarray]]:
@@ -144,27 +151,14 @@ def _to_metres_z_up(path: Path) -> np.ndarray:
         return np.eye(3)
     asset = next((child for child in ET.parse(str(path)).getroot() if _local(child) == "asset"), None)
     described = {} if asset is None else {_local(child): child for child in asset}
-    unit = _metres(path, described["unit"].get("meter", "1")) if "unit" in described else 1.0
+    text = described["unit"].get("meter", "1") if "unit" in described else "1"
+    try:
+        unit = float(text)
+    except ValueError:
+        raise WorldError(f"{path}: <unit meter={text!r}> is not a number") from None
     axis = (described["up_axis"].text or "").strip() if "up_axis" in described else "Y_UP"
     return unit * _COLLADA_AXES.get(axis, _Y_UP)
 
 
-def _metres(path: Path, text: str) -> float:
-    try:
-        return float(text)
-    except ValueError:
-        raise WorldError(f"{path}: <unit meter={text!r}> is not a number") from None
-
-
 def _local(element: ET.Element) -> str:
     return element.tag.rpartition("}")[2]
-
-
-def _checked(path: Path, vertices: np.ndarray, faces: np.ndarray) -> Mesh:
-    if not len(faces):
-        raise WorldError(f"{path}: no triangle in it")
-    if faces.max() >= len(vertices) or faces.min() < 0:
-        raise WorldError(f"{path}: a triangle names a vertex that is not there")
-    if not (np.abs(vertices) <= FARTHEST).all():
-        raise WorldError(f"{path}: a vertex is farther than {FARTHEST:g} m from the origin")
-    return vertices, faces
