@@ -121,7 +121,6 @@ class AutopilotLinkNode:
     def __init__(self) -> None:
         """Raises ParameterError for a bad parameter, StartError for a connection that is none."""
         self.health = make_health("autopilot_link")
-        self.healths = [self.health]
         self._lock = threading.Lock()
         self._corrections = Corrections()
         self._status: Optional[Tuple[float, PositionStatus]] = None

@@ -42,7 +42,6 @@ class DeadReckoning:
     def __init__(self) -> None:
         """Raises ParameterError for a bad parameter."""
         self.health = make_health("dead_reckoning")
-        self.healths = [self.health]
         self._lock = threading.Lock()
         self._classes = MessageClasses()
         self._live = ReconfigurableParameters(DeadReckoningParameters, "~", self.health, self._use_parameters)

@@ -58,13 +58,12 @@ class LogPlayer:
         self._options = options
         self._reader = opened(options.file)
         self._published = 0
-        self._health = make_health("play_852")
-        self.healths = [self._health]
-        self._publish = guarded(self._health, self._publish_ping)
+        self.health = make_health("play_852")
+        self._publish = guarded(self.health, self._publish_ping)
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=1000)
         self._ended = threading.Event()
         rospy.on_shutdown(self._end)
-        threading.Thread(target=guarded(self._health, self._run), daemon=True).start()
+        threading.Thread(target=guarded(self.health, self._run), daemon=True).start()
 
     def _run(self) -> None:
         try:
@@ -98,7 +97,7 @@ class LogPlayer:
         if message is not None:
             message.header.stamp, message.header.frame_id = rospy.Time.from_sec(stamp), self._options.frame_id
             self._beams.publish(message)
-            self._health.count("beams out")
+            self.health.count("beams out")
             self._published += 1
 
     def _end(self) -> None:
@@ -114,8 +113,7 @@ class LogRecorder:
 
     def __init__(self, options: Namespace) -> None:
         """Raises StartError when the log cannot be written."""
-        self._health = make_health("record_852")
-        self.healths = [self._health]
+        self.health = make_health("record_852")
         self._driver = rospy.resolve_name(options.driver)
         self._settings = HeadSettings(head_id=rospy.get_param(f"{self._driver}/head_id", HeadSettings.head_id))
         self._inverted = False
@@ -125,10 +123,8 @@ class LogRecorder:
             self._writer = LogWriter(options.file)
         except OSError as error:
             raise StartError(f"{options.file}: {error.strerror}") from error
-        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(self._health, self._take_settings))
-        self._beams = rospy.Subscriber(
-            topics.BEAMS, SonarScanLine, guarded(self._health, self._record), queue_size=1000
-        )
+        rospy.Subscriber(f"{self._driver}/parameter_updates", Config, guarded(self.health, self._take_settings))
+        self._beams = rospy.Subscriber(topics.BEAMS, SonarScanLine, guarded(self.health, self._record), queue_size=1000)
         rospy.on_shutdown(self._end)
 
     def _take_settings(self, config: Config) -> None:
@@ -137,7 +133,7 @@ class LogRecorder:
         try:
             self._settings = self._settings.changed({name: values[name] for name in names if name in values})
         except ParameterError as error:
-            self._health.problem("settings not understood", str(error))
+            self.health.problem("settings not understood", str(error))
         self._inverted = bool(values.get("inverted", False))
 
     def _record(self, message: SonarScanLine) -> None:
@@ -151,7 +147,7 @@ class LogRecorder:
             self._clockwise = 0 < (position - self._last_position) % 2400 < 1200
         self._last_position = position
         self._writer.write(logged_ping(message, self._settings, self._inverted, self._clockwise))
-        self._health.count("pings written")
+        self.health.count("pings written")
 
     def _end(self) -> None:
         self._beams.unregister()

@@ -53,7 +53,6 @@ class MlsmCore:
     def __init__(self, namespace: str = "~") -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health("mlsm_core")
-        self.healths = [self.health]
         parameters = read_parameters(MlsmCoreParameters, namespace)
         self._localiser = parameters.build_localiser()
         self._longest_turn = parameters.longest_turn
@@ -290,7 +289,7 @@ class Mapping:
         self._core = MlsmCore(rospy.resolve_name("mlsm_core"))
         self._pipeline = Pipeline(CloudSink(self._core.insert), CloudSink(self._core.match), self._core.hear)
         self._core.status.stages_before = self._pipeline.healths
-        self.healths: List[Health] = [*self._pipeline.healths, *self._core.healths]
+        self.healths: List[Health] = [*self._pipeline.healths, self._core.health]
 
 
 def run_mlsm_core() -> None:
@@ -298,4 +297,4 @@ def run_mlsm_core() -> None:
 
 
 def run_mapping() -> None:
-    run("mapping", Mapping)
+    run("mapping", Mapping, lambda mapping: mapping.healths)

@@ -22,7 +22,6 @@ class ThesisTopics:
 
     def __init__(self) -> None:
         self.health = make_health("thesis_topics")
-        self.healths = [self.health]
         self._joint = rospy.get_param("sonar_control/joint", "sonar_servo_joint")
         self._classes = MessageClasses(())
         self._walls = rospy.Publisher("sonar/walls/coeff", Wall, queue_size=_QUEUE)

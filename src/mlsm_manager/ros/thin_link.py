@@ -35,7 +35,6 @@ class ThinLink(rospy.SubscribeListener):
     def __init__(self) -> None:
         """Raises ParameterError."""
         self.health = make_health("thin_link")
-        self.healths = [self.health]
         self._parameters = read_parameters(ThinLinkParameters, "~")
         self._queue = ThinQueue(self._parameters.bytes_per_second)
         self._lock = threading.Lock()

@@ -10,7 +10,7 @@ import time
 import xmlrpc.client
 from contextlib import suppress
 from functools import partial
-from typing import Any, Callable, NoReturn, Optional, Protocol, Sequence
+from typing import Any, Callable, NoReturn, Optional, Sequence
 
 import rosgraph
 import rospy
@@ -42,33 +42,32 @@ class StartError(Exception):
     """The node cannot start until the user changes something; the text says what, in one line."""
 
 
-class Node(Protocol):
-    """What `run` runs."""
-
-    healths: Sequence[Health]
-    """Of all stages that the node hosts, for /diagnostics."""
-
-
-def run(name: str, make_node: Callable[[], Node]) -> NoReturn:
+def run(
+    name: str, make_node: Callable[[], Any], healths_of: Callable[[Any], Sequence[Health]] = lambda one: [one.health]
+) -> NoReturn:
     """Initialise the node, make it, publish its diagnostics, wait for Ctrl-C and end the process.
 
     ParameterError, StartError and the loss of its registration at the master end it with one line and status 1.
+    healths_of: returns the health of all stages that the node hosts, for /diagnostics.
     """
     interrupt = _Interrupt()
     hold_little()
     try:
-        status = _run(name, make_node, interrupt)
+        status = _run(name, make_node, healths_of, interrupt)
     except (KeyboardInterrupt, rospy.ROSInterruptException):
         status = 0
     _end(status)
 
 
-def _run(name: str, make_node: Callable[[], Node], interrupt: "_Interrupt") -> int:
+def _run(
+    name: str, make_node: Callable[[], Any], healths_of: Callable[[Any], Sequence[Health]], interrupt: "_Interrupt"
+) -> int:
     rospy.init_node(name, disable_signals=True)
     try:
         node = make_node()
-        publish_diagnostics(node.healths)
-        every(MEMORY_PERIOD, give_back, node.healths[0])
+        healths = healths_of(node)
+        publish_diagnostics(healths)
+        every(MEMORY_PERIOD, give_back, healths[0])
     except (ParameterError, StartError) as error:
         rospy.logfatal("%s: %s", rospy.get_name(), error)
         return 1

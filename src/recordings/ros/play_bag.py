@@ -63,14 +63,13 @@ class BagPlayer:
     def __init__(self, options: Namespace) -> None:
         """Raises StartError for a bag that cannot be played."""
         self._options = options
-        self._health = make_health("play_bag")
-        self.healths = [self._health]
+        self.health = make_health("play_bag")
         self._messages = read_messages(options)
         self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
         self._publishers = self._advertised()
         self._ended = threading.Event()
         rospy.on_shutdown(self._ended.set)
-        threading.Thread(target=guarded(self._health, self._play), daemon=True).start()
+        threading.Thread(target=guarded(self.health, self._play), daemon=True).start()
 
     def _advertised(self) -> Dict[str, rospy.Publisher]:
         kinds = {played.topic: type(played.message) for played in self._messages}
@@ -91,7 +90,7 @@ class BagPlayer:
             if self._ended.is_set():
                 return
             self._publishers[played.topic].publish(played.message)
-            self._health.count("messages")
+            self.health.count("messages")
         seconds = self._messages[-1].time - start
         rospy.loginfo("%s has ended after %.0f s; the map stays, Ctrl-C ends it", self._options.bag, seconds)
         self._ended.wait(LAST_MESSAGES_ARRIVE)
@@ -100,14 +99,14 @@ class BagPlayer:
     def _tick(self, pace: Pace, since_start: float) -> None:
         if pace.wait_for(since_start):
             detail = f"{pace.lost:.1f} s in all: the machine cannot keep up with rate {self._options.rate:g}"
-            self._health.problem("delays", f"{detail}; give a smaller one")
+            self.health.problem("delays", f"{detail}; give a smaller one")
         self._clock.publish(Clock(genpy.Time.from_sec(self._messages[0].time + since_start)))
 
     def _wait_for_subscribers(self) -> None:
         """Keep the first messages from being played to nobody, or only to those that connect fast."""
         while not self._ended.wait(_WAIT_STEP):
             missing = [topic for topic, publisher in self._publishers.items() if not publisher.get_num_connections()]
-            self._health.show("topics without subscriber", " ".join(missing))
+            self.health.show("topics without subscriber", " ".join(missing))
             if not missing:
                 break
         for _ in range(int(_LATECOMERS / _WAIT_STEP)):

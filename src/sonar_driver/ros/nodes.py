@@ -56,7 +56,6 @@ class DriverNode:
         self._stop = threading.Event()
         self._last_stats = LineStats()
         self.health = DriverHealth(name, lambda line: rospy.logwarn("%s", line), self._stats)
-        self.healths = [self.health]
         self._live = ReconfigurableParameters(parameters, "~", self.health, self._use_parameters)
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
@@ -142,7 +141,6 @@ class EmulatorNode:
         line: makes the line of that link, not yet open.
         """
         self.health = make_health(name)
-        self.healths = [self.health]
         self._faults: Optional[FaultInjector] = None
         self._live = ReconfigurableParameters(parameters, "~", self.health, self._use_parameters)
         current = self._live.current.changed({"link": os.path.expanduser(self._live.current.link)})

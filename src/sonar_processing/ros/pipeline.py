@@ -35,7 +35,6 @@ class StageRunner:
     def __init__(self, name: str, namespace: str) -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health(name)
-        self.healths = [self.health]
         self.type = STAGES[name]
         self._emptied = EmptiedScans()
         self._places: Optional[SonarPlaces] = None

@@ -39,7 +39,6 @@ class ShapeDetectorNode(ABC):
     def __init__(self, namespace: str = "~") -> None:
         """Raises ParameterError for a bad parameter in `namespace`."""
         self.health = make_health(self.name)
-        self.healths = [self.health]
         self._live = ReconfigurableParameters(self.parameters, namespace, self.health, self._use_parameters)
         self._places = SonarPlaces(self._live.current.sonar_frame, self.health, self._live.current.stamp_tolerance)
         self._inliers = PointsPublisher(self.topic)

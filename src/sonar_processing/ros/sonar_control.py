@@ -26,7 +26,6 @@ class SonarControl:
     def __init__(self) -> None:
         """Raises ParameterError for a bad parameter."""
         self.health = make_health("sonar_control")
-        self.healths = [self.health]
         self._lock = threading.RLock()
         self._scan: Optional[TiltScan] = None
         self._commands = rospy.Publisher(topics.SERVO_COMMANDS, Float64, queue_size=1, latch=True)

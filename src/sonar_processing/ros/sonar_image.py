@@ -26,7 +26,6 @@ class SonarImage(rospy.SubscribeListener):
         """Raises ParameterError for a bad parameter in `namespace`."""
         super().__init__()
         self.health = make_health("sonar_image")
-        self.healths = [self.health]
         self._lock = threading.Lock()
         self._drawing = threading.Lock()
         self._beams: Optional[BeamSubscriber] = None

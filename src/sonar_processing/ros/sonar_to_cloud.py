@@ -68,7 +68,6 @@ class SonarToCloud:
         Raises ParameterError for a bad parameter in `namespace`.
         """
         self.health = make_health("sonar_to_cloud")
-        self.healths = [self.health]
         self._scan_sink, self._beam_sink = scan_sink, beam_sink
         self._moving_state = MovingState()
         self._revolution = RevolutionCollector()

@@ -86,7 +86,6 @@ class GazeboSonar:
     def __init__(self) -> None:
         """Raises ParameterError."""
         self.health = make_health("gazebo_sonar")
-        self.healths = [self.health]
         values = dict(rospy.get_param("~", {}))
         groups = {name: kind.from_group(name, values.pop(name, {})) for name, kind in GROUPS.items()}
         self._parameters = GazeboSonarParameters.from_mapping(values)

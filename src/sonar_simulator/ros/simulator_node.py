@@ -64,7 +64,6 @@ class Simulator:
     def __init__(self) -> None:
         """Raises ParameterError if a parameter, the world, the script or the robot's description cannot be used."""
         self.health = make_health("sonar_simulator")
-        self.healths = [self.health]
         settings = Settings.from_mapping(rospy.get_param("~", {}))
         self._parameters = settings.simulator
         self._simulation = Simulation(settings, package_folder(), _robot(), lambda line: rospy.logwarn("%s", line))

@@ -45,7 +45,6 @@ class WebPage:
     def __init__(self) -> None:
         """Raises ParameterError, and StartError where the port cannot be had."""
         self.health = make_health("web_page")
-        self.healths = [self.health]
         self._parameters = parameters = read_parameters(WebPageParameters, "~")
         self._origin: Optional[Origin] = None
         self._marks: List[Mark] = []
