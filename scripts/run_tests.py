@@ -94,6 +94,13 @@ def steps() -> List[Step]:
     ]
 
 
+def _damaged_files() -> Step:
+    """Return the step of scripts/fuzz, with few of its damages."""
+    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "5"]
+    variables = {"PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}", "OPENBLAS_NUM_THREADS": "1"}
+    return Step("damaged files", command, load=Load.SPARE, timeout=SPARE_TIMEOUT, variables=variables)
+
+
 def _longest_first(files: Iterable[Path]) -> List[Path]:
     order = {stem: number for number, stem in enumerate(LONG)}
     return sorted(files, key=lambda path: (order.get(path.stem, len(LONG)), path.stem))
@@ -109,13 +116,6 @@ def _pytest(name: str, *arguments: str, load: Load = Load.WHOLE) -> Step:
     report = RESULTS / f"{name.replace(' ', '_')}.xml"
     command = ["python3", "-m", "pytest", *arguments, f"--junitxml={report}"]
     return Step(name, command, report, load, SPARE_TIMEOUT if load is Load.SPARE else STEP_TIMEOUT)
-
-
-def _damaged_files() -> Step:
-    """Return the step of scripts/fuzz, with few of its damages."""
-    command = ["python3", "-m", "fuzz_files", "--files", "--mutations", "5"]
-    variables = {"PYTHONPATH": f"{ROOT / 'scripts'}:{os.environ['PYTHONPATH']}", "OPENBLAS_NUM_THREADS": "1"}
-    return Step("damaged files", command, load=Load.SPARE, timeout=SPARE_TIMEOUT, variables=variables)
 
 
 def _rostest(test: Path) -> Step:
@@ -157,22 +157,27 @@ def run_step(step: Step) -> Outcome:
 
 
 def _told(step: Step, outcome: Outcome, output: str, seconds: float) -> List[str]:
-    failures = [output.rstrip(), *_failure_texts(step)] if outcome.failed else []
+    texts = [element.text or "" for kind in ("failure", "error") for element in _found(step, kind)]
+    failures = [output.rstrip(), *texts] if outcome.failed else []
     skipped = f", {outcome.skipped} skipped" if outcome.skipped else ""
     counts = f"{outcome.passed} passed, {outcome.failed} failed{skipped} ({seconds:.1f} s)"
-    reasons = [f"       skipped: {reason}" for reason in _skip_reasons(step)] if outcome.skipped else []
-    return [*failures, f"{'FAILED' if outcome.failed else 'ok':6} {step.name}: {counts}", *reasons]
+    reasons = sorted({_skip_reason(element) for element in _found(step, "skipped")})
+    told = f"{'FAILED' if outcome.failed else 'ok':6} {step.name}: {counts}"
+    return [*failures, told, *(f"       skipped: {reason}" for reason in reasons)]
 
 
 def _counted(step: Step, status: int) -> Outcome:
     if step.report is None:
         return Outcome(int(status == 0), int(status != 0))
-    cases = _cases(step.report)
-    failed = sum(bool(case.findall("failure") or case.findall("error")) for case in cases)
-    skipped = sum(bool(case.findall("skipped")) for case in cases)
-    passed = len(cases) - failed - skipped
+    cases = len(_cases(step.report))
+    failed, skipped = len(_found(step, "failure")) + len(_found(step, "error")), len(_found(step, "skipped"))
     # A step that broke before, after or without its tests has failed, whatever the tests say.
-    return Outcome(passed, max(failed, int(status != 0 or not cases)), skipped)
+    return Outcome(max(cases - failed - skipped, 0), max(failed, int(status != 0 or not cases)), skipped)
+
+
+def _found(step: Step, kind: str) -> List[ET.Element]:
+    """Return what a step's tests said of one kind: failure, error or skipped."""
+    return [element for case in _cases(step.report) for element in case.findall(kind)] if step.report else []
 
 
 def _cases(report: Path) -> List[ET.Element]:
@@ -186,16 +191,6 @@ def _root(report: Path) -> ET.Element:
         return ET.parse(str(report)).getroot()
     except ET.ParseError:
         return ET.Element("testsuites")
-
-
-def _failure_texts(step: Step) -> List[str]:
-    cases = _cases(step.report) if step.report else []
-    return [element.text or "" for case in cases for kind in ("failure", "error") for element in case.findall(kind)]
-
-
-def _skip_reasons(step: Step) -> List[str]:
-    cases = _cases(step.report) if step.report else []
-    return sorted({_skip_reason(element) for case in cases for element in case.findall("skipped")})
 
 
 def _skip_reason(element: ET.Element) -> str:

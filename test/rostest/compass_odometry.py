@@ -5,8 +5,8 @@ import math
 import unittest
 
 import rospy
-from geometry_msgs.msg import Quaternion, TwistWithCovarianceStamped
-from graph import Diagnostics, Inbox, publisher, run
+from geometry_msgs.msg import Quaternion, Twist, TwistWithCovarianceStamped, Vector3
+from graph import Diagnostics, Inbox, publisher, run, wait_until
 from nav_msgs.msg import Odometry
 from sensor_msgs.msg import Imu
 from std_msgs.msg import Float64
@@ -90,7 +90,20 @@ class DeadReckoning(unittest.TestCase):
             headings.publish(Float64(data=heading))
         self.assertAlmostEqual(_yaw(odometry.wait_for()), -math.pi / 4.0, places=6)
 
-    def test_6_what_a_dvl_measures_moves_another_vehicle_along_its_heading(self) -> None:
+    def test_6_a_vehicle_that_measures_no_velocity_goes_as_it_is_commanded(self) -> None:
+        odometry, headings = Inbox("/level/odom", Odometry).linked(), publisher("/level/compass", Float64)
+        commands = publisher("/cmd_vel", Twist)
+
+        def has_moved() -> bool:
+            commands.publish(Twist(linear=Vector3(0.5, 0.0, 0.0)))
+            headings.publish(Float64(data=0.0))
+            return bool(odometry.messages) and odometry.messages[-1].pose.pose.position.y > 0.1
+
+        wait_until(has_moved)
+        self.assertEqual(odometry.messages[-1].twist.twist.linear.x, 0.5)
+        self.assertAlmostEqual(odometry.messages[-1].pose.pose.position.x, 0.0, places=6)
+
+    def test_7_what_a_dvl_measures_moves_another_vehicle_along_its_heading(self) -> None:
         """0.5 m/s to the right for 2 s, heading east, are 1 m to the south."""
         odometry, velocities = Inbox("/dvl/odom", Odometry).linked(), publisher("/dvl", TwistWithCovarianceStamped)
         velocity = TwistWithCovarianceStamped()

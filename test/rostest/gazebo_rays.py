@@ -10,9 +10,10 @@ import tf2_ros
 from geometry_msgs.msg import Point32
 from graph import Diagnostics, Inbox, end_publishing, publisher, run, wait_for_listeners
 from messages import transform
-from sensor_msgs.msg import ChannelFloat32, JointState, LaserScan, PointCloud, PointCloud2, PointField
+from sensor_msgs.msg import ChannelFloat32, JointState, LaserScan, PointCloud, PointCloud2
 from std_msgs.msg import Header, String
 
+from sonar_processing.ros.conversions import point_cloud
 from underwater_map_construction.msg import SonarScanLine
 
 FULL_CIRCLE, BEAM = 2.0 * math.pi, math.radians(2.5)
@@ -56,15 +57,9 @@ def block_laser(header: Header, opening: float = FULL_CIRCLE, columns: int = 721
 
 
 def cloud2(header: Header) -> PointCloud2:
-    """As plugins that publish PointCloud2: x, y, z, intensity and the ring, unordered, 22 bytes a point."""
-    points = _points(FULL_CIRCLE, 721).astype(np.float32)
-    row = np.dtype({"names": ["xyz", "intensity", "ring"], "formats": ["3<f4", "<f4", "<u2"], "offsets": [0, 16, 20],
-                    "itemsize": 22})  # fmt: skip
-    rows = np.zeros(len(points), dtype=row)
-    rows["xyz"] = points
-    fields = [PointField(name, 4 * number, PointField.FLOAT32, 1) for number, name in enumerate("xyz")]
-    fields += [PointField("intensity", 16, PointField.FLOAT32, 1), PointField("ring", 20, PointField.UINT16, 1)]
-    return PointCloud2(header, 1, len(rows), fields, False, 22, 22 * len(rows), rows.tobytes(), True)
+    """As plugins that publish PointCloud2: x, y, z and intensity."""
+    points = _points(FULL_CIRCLE, 721)
+    return point_cloud(np.column_stack([points, np.zeros(len(points))]), header.stamp.to_nsec(), header.frame_id)
 
 
 def header(seconds: float, frame_id: str = "sonar") -> Header:

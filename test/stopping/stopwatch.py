@@ -9,7 +9,7 @@ import time
 import xmlrpc.client
 from contextlib import suppress
 from pathlib import Path
-from typing import List, Set
+from typing import Callable, List, Optional, Set
 
 PACKAGE = "underwater_map_construction"
 START_TIMEOUT = 300.0
@@ -29,13 +29,21 @@ def seconds_to_stop(launch_file: str, arguments: List[str], log: Path) -> float:
 def seconds_of(command: List[str], nodes: Set[str], log: Path) -> float:
     """Return the seconds from SIGINT until a command that starts a master and nodes has ended."""
     port = free_port()
-    environment = {**os.environ, "ROS_MASTER_URI": f"http://localhost:{port}", "ROS_LOG_DIR": str(log.parent)}
+    uri = f"http://localhost:{port}"
+    environment = {**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(log.parent)}
     with log.open("wb") as output:
         launch = subprocess.Popen(
             [*command, "-p", str(port)], env=environment, stdout=output, stderr=output, start_new_session=True
         )
+
+    def is_up() -> bool:
+        """Whether every node has registered something besides its log, which is the first thing that a node does."""
+        assert launch.poll() is None, log.read_text(errors="replace")
+        states = [(name, node) for kind in state_of_master(uri) or () for name, those in kind for node in those]
+        return nodes <= {node for name, node in states if node == "/rosout" or not name.endswith(_FIRST)}
+
     try:
-        _wait_for(nodes, port, launch, log)
+        wait_until(is_up, told=f"all of {nodes}")
         start = time.monotonic()
         launch.send_signal(signal.SIGINT)
         launch.wait(STOP_TIMEOUT)
@@ -56,15 +64,17 @@ def free_port() -> int:
     raise AssertionError(f"no free port from {lowest // 2} to {lowest}")
 
 
-def _wait_for(nodes: Set[str], port: int, launch: "subprocess.Popen[bytes]", log: Path) -> None:
-    """Wait until every node has registered something besides its log, which is the first thing that a node does."""
-    master = xmlrpc.client.ServerProxy(f"http://localhost:{port}")
-    deadline = time.monotonic() + START_TIMEOUT
-    registered: Set[str] = set()
-    while not nodes <= registered:
-        assert launch.poll() is None, log.read_text(errors="replace")
-        assert time.monotonic() < deadline, f"not there: {nodes - registered}\n{log.read_text(errors='replace')}"
-        time.sleep(0.1)
-        with suppress(OSError):
-            states = [(name, node) for kind in master.getSystemState("/")[2] for name, those in kind for node in those]
-            registered = {node for name, node in states if node == "/rosout" or not name.endswith(_FIRST)}
+def wait_until(holds: Callable[[], bool], seconds: float = START_TIMEOUT, told: str = "") -> None:
+    """Wait until a state holds; raises AssertionError, which says what is `told`, after so many seconds."""
+    end = time.monotonic() + seconds
+    while not holds():
+        assert time.monotonic() < end, f"not within {seconds:g} s: {told}"
+        time.sleep(0.05)
+
+
+def state_of_master(uri: str) -> Optional[list]:
+    """Return publishers, subscribers and services, None where the master does not answer."""
+    try:
+        return xmlrpc.client.ServerProxy(uri).getSystemState("/")[2]
+    except OSError:
+        return None

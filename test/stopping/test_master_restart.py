@@ -5,10 +5,9 @@ import signal
 import subprocess
 import sys
 import time
-import xmlrpc.client
 
 import pytest
-from stopwatch import ROOT, START_TIMEOUT, STOP_TIMEOUT, free_port
+from stopwatch import ROOT, START_TIMEOUT, STOP_TIMEOUT, free_port, state_of_master, wait_until
 
 from imagenex_852_driver.log_file import LoggedPing, LogWriter
 from imagenex_852_driver.reply import Reply, ReplyKind
@@ -35,37 +34,22 @@ class Master:
     def __init__(self, logs):
         self._port = free_port()
         uri = f"http://localhost:{self._port}"
+        self.environment = {**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(logs)}
         # Whoever is told to abort then says what each thread does.
-        telling = {"PYTHONFAULTHANDLER": "1"}
-        self.environment = {**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(logs), **telling}
+        self.environment["PYTHONFAULTHANDLER"] = "1"
         self.start()
 
     def start(self):
-        self.process = subprocess.Popen(
-            ["rosmaster", "--core", "-p", str(self._port)],
-            env=self.environment,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.DEVNULL,
-        )
-        deadline = time.monotonic() + START_TIMEOUT
-        while self._state() is None:
-            assert time.monotonic() < deadline, "the master does not answer"
-            time.sleep(0.05)
+        command, silent = ["rosmaster", "--core", "-p", str(self._port)], subprocess.DEVNULL
+        self.process = subprocess.Popen(command, env=self.environment, stdout=silent, stderr=silent)
+        wait_until(lambda: self.state() is not None, told="an answer of the master")
 
     def stop(self):
         self.process.kill()
         self.process.wait()
 
-    def publishes_diagnostics(self, node):
-        publishers, _, _ = self._state()
-        return f"/{node}" in dict(publishers).get("/diagnostics", [])
-
-    def _state(self):
-        """Return publishers, subscribers and services; None where the master does not answer."""
-        try:
-            return xmlrpc.client.ServerProxy(self.environment["ROS_MASTER_URI"]).getSystemState("/")[2]
-        except OSError:
-            return None
+    def state(self):
+        return state_of_master(self.environment["ROS_MASTER_URI"])
 
 
 @pytest.fixture
@@ -88,11 +72,10 @@ def nodes(master, tmp_path):
         for node in NODES
     }
     try:
-        deadline = time.monotonic() + START_TIMEOUT
-        while not all(master.publishes_diagnostics(node) for node in NODES):
-            assert _ends(started) == dict.fromkeys(NODES)
-            assert time.monotonic() < deadline
-            time.sleep(0.1)
+        names = {f"/{node}" for node in NODES}
+        wait_until(
+            lambda: names <= set(dict(master.state()[0]).get("/diagnostics", [])), told=f"diagnostics of {names}"
+        )
         yield started
     finally:
         for process in started.values():

@@ -3,7 +3,7 @@
 import json
 import subprocess
 import sys
-import time
+from contextlib import suppress
 from functools import partial
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 from threading import Thread
@@ -11,7 +11,7 @@ from urllib.request import urlopen
 
 import numpy as np
 import pytest
-from stopwatch import ROOT, START_TIMEOUT, free_port
+from stopwatch import ROOT, START_TIMEOUT, free_port, wait_until
 from test_master_restart import Master
 
 from georeferencing.origin import Origin
@@ -58,25 +58,21 @@ class Site:
             self.nodes.pop(name).wait()
 
     def open_page(self):
-        end = time.monotonic() + START_TIMEOUT
-        while True:
-            try:
-                urlopen(f"http://127.0.0.1:{self.port}/", timeout=5).close()
-                break
-            except OSError:
-                assert time.monotonic() < end, "the page is not served"
-                time.sleep(0.1)
+        wait_until(self.is_served, told="the page is served")
         self.browser.get(f"http://127.0.0.1:{self.port}/?theme=light")
+
+    def is_served(self):
+        with suppress(OSError):
+            urlopen(f"http://127.0.0.1:{self.port}/", timeout=5).close()
+            return True
+        return False
 
     def run(self, script, *arguments):
         return self.browser.execute_script(script, *arguments)
 
-    def wait(self, condition, seconds=START_TIMEOUT):
+    def wait(self, condition):
         """Wait until an expression of the page is true."""
-        end = time.monotonic() + seconds
-        while not self.run(f"return Boolean({condition})"):
-            assert time.monotonic() < end, f"{condition}: not within {seconds:g} s"
-            time.sleep(0.05)
+        wait_until(lambda: self.run(f"return Boolean({condition})"), told=condition)
 
     def errors(self):
         """Return what the console says, but for links that are refused while there is no server."""

@@ -18,6 +18,9 @@ def _rows(text):
 
 RUNNING, TESTING = map(_rows, (ROOT / "scripts/dependencies.txt").read_text().split("## Only with --all", 1))
 ROWS = RUNNING + TESTING
+KEYS = {one.text for one in ET.parse(str(ROOT / "package.xml")).getroot() if one.tag.endswith("depend")}
+PIP_KEYS = {key for key in KEYS if key.endswith("-pip")}
+ROSDEP = yaml.safe_load((ROOT / "test/data/rosdep_python.yaml").read_text())
 CHANGES_THE_SYSTEM = ["apt-get", "sudo", "pip", "catkin_make"]
 
 
@@ -36,10 +39,9 @@ def checkout(tmp_path):
 def _dry_run(checkout, distro, *options):
     """Return what a dry run prints; it must end well."""
     path = os.pathsep.join([str(checkout.parent / "bin"), os.environ["PATH"]])
-    command = ["bash", str(checkout / "scripts" / "bootstrap"), "--dry-run", "--distro", distro, *options]
-    return subprocess.run(
-        command, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, check=True, text=True
-    ).stdout.splitlines()
+    command = ["bash", str(checkout / "scripts/bootstrap"), "--dry-run", "--distro", distro, *options]
+    done = subprocess.run(command, env={**os.environ, "PATH": path}, stdout=subprocess.PIPE, check=True, text=True)
+    return done.stdout.splitlines()
 
 
 def _installed(lines):
@@ -83,27 +85,18 @@ def test_every_dependency_has_a_name_on_both_systems_or_a_dash():
 
 
 def test_every_key_of_the_package_is_installed():
-    package = ET.parse(str(ROOT / "package.xml")).getroot()
-    keys = {element.text for element in package if element.tag.endswith("depend")}
-    assert keys - {row[0] for row in ROWS} == set()
-    assert "rospy" in keys
-
-
-def _pip_keys():
-    package = ET.parse(str(ROOT / "package.xml")).getroot()
-    return {element.text for element in package if (element.text or "").endswith("-pip")}
+    assert KEYS - {row[0] for row in ROWS} == set()
+    assert "rospy" in KEYS
 
 
 def test_rosdep_knows_every_pip_key_of_the_package_on_both_systems():
-    rosdep = yaml.safe_load((ROOT / "test/data/rosdep_python.yaml").read_text())
-    assert _pip_keys() == set(rosdep)
-    assert all(rosdep[key][system]["pip"]["packages"] for key in rosdep for system in ("debian", "ubuntu"))
+    assert set(ROSDEP) == PIP_KEYS
+    assert all(ROSDEP[key][system]["pip"]["packages"] for key in ROSDEP for system in ("debian", "ubuntu"))
 
 
 def test_every_pip_key_of_the_package_is_in_the_requirements_unless_apt_has_it():
     from_apt = {row[0] for row in ROWS if row[1] != "-"}
-    rosdep = yaml.safe_load((ROOT / "test/data/rosdep_python.yaml").read_text())
-    wanted = {rosdep[key]["ubuntu"]["pip"]["packages"][0] for key in _pip_keys() - from_apt}
+    wanted = {ROSDEP[key]["ubuntu"]["pip"]["packages"][0] for key in PIP_KEYS - from_apt}
     required = {re.split("[<>=]", line)[0] for line in (ROOT / "scripts" / "requirements.txt").read_text().splitlines()}
     assert wanted == {"bluerobotics-ping", "trimesh", "pycollada"}
     assert wanted | {"embreex"} <= required

@@ -50,6 +50,19 @@ def test_a_simulated_vehicle_without_instruments_is_followed_as_one_that_tells_n
     assert not any(name.startswith("/dead_reckoning/") for name in found)
 
 
+def test_a_simulated_vehicle_with_thrusters_goes_as_it_is_commanded():
+    found = launched("demo.launch", "odometry:=thrusters")
+    assert (found["/sonar_simulator/instruments"], found["/mlsm_core/odometry"]) == ("COMPASS", "THRUSTERS")
+    assert found["/dead_reckoning/velocity_source"] == "COMMANDS"
+
+
+def test_a_sonar_that_stood_is_mounted_in_the_vehicle_and_turns_in_as_many_beams_as_are_told():
+    found = launched(
+        "play_bag.launch", "bag:=/none.bag", "beams:=/micron/scan_line", "standing:=true", "scan_size:=200"
+    )
+    assert (found["/sonar_to_cloud/mounted_in"], found["/sonar_to_cloud/scan_size"]) == ("base_link", 200)
+
+
 def test_a_topside_behind_a_thin_link_sends_who_wants_the_page_to_the_vehicle():
     assert "/web_page/map_frame" in launched("topside.launch", "web:=true")
     assert "/web_page/map_frame" not in launched("topside.launch", "link:=thin")

@@ -21,24 +21,11 @@ START = genpy.Time(1400000000, 123456789)
 def _recorded():
     """Return what a bag shall hold, as messages of today: (topic, message)."""
     rng = np.random.default_rng(0)
-    lines = [
-        SonarScanLine(
-            header=header(START.to_nsec() + 10**8 * count, "sonar"),
-            angle=-0.05 * count,
-            intensities=rng.integers(0, 256, 500, dtype=np.uint8).tobytes(),
-            maxrange_meters=50.0,
-            range_resolution=0.1,
-            gain=20 + count,
-            sensorAngle=0.25,
-        )
-        for count in range(5)
-    ]
-    cloud = StampedIntensityCloud(
-        header=header(START.to_nsec(), "odom"),
-        cloud=point_cloud(rng.normal(size=(40, 4)), START.to_nsec() + 1, "odom", height=2),
-        timeStamps=rng.normal(size=40).tolist(),
-    )
-    return [("/sonar/raw", line) for line in lines] + [("/sonar/scan/cleaned", cloud)]
+    strengths = rng.integers(0, 256, 500, dtype=np.uint8).tobytes()
+    line = SonarScanLine(header(START.to_nsec(), "sonar"), -0.05, strengths, 50.0, 0.1, 21, 0.25)
+    points = point_cloud(rng.normal(size=(40, 4)), START.to_nsec() + 1, "odom", height=2)
+    cloud = StampedIntensityCloud(header(START.to_nsec(), "odom"), points, rng.normal(size=40).tolist())
+    return [("/sonar/raw", line), ("/sonar/scan/cleaned", cloud)]
 
 
 @pytest.fixture(scope="module")
