@@ -4,12 +4,11 @@
 import sys
 import time
 import unittest
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Dict, List
 
 import rospy
-from graph import PACKAGE_ROOT, Diagnostics, Inbox, launched, process_of, run
+from graph import PACKAGE_ROOT, Diagnostics, Inbox, launch, process_of, run
 
 from underwater_map_construction.msg import SonarScanLine
 
@@ -64,10 +63,9 @@ class Load(unittest.TestCase):
     """An 852 at its fastest rate, or a Ping360 that is faster than a real head."""
 
     def test_the_driver_is_quick_and_loses_nothing(self) -> None:
-        with ExitStack() as running:
-            if SONAR == "ping360":
-                running.enter_context(launched("ping360_load.launch", f"port:={free_udp_port()}"))
-            self.assertTrue(any(_load_of(rospy.get_param("~seconds")).is_quick() for _ in range(ATTEMPTS)))
+        if SONAR == "ping360":
+            launch(self.addCleanup, "ping360_load.launch", f"port:={free_udp_port()}")
+        self.assertTrue(any(_load_of(rospy.get_param("~seconds")).is_quick() for _ in range(ATTEMPTS)))
 
 
 def _load_of(seconds: float) -> DriverLoad:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import rospy
 from geometry_msgs.msg import PoseWithCovarianceStamped
-from graph import LONG_PATIENCE, Inbox, launched, run
+from graph import LONG_PATIENCE, Inbox, launch, run
 from messages import stamps_and_places, true_places, variance
 from nav_msgs.msg import Odometry
 
@@ -27,9 +27,9 @@ class VehicleFollowed(unittest.TestCase):
         """Truth and fixes begin at the first fix."""
         truth, odometry = Inbox("/ground_truth", Odometry), Inbox("/odom", Odometry)
         fixes, count = Inbox("/MLSM/pose", PoseWithCovarianceStamped), given("fixes")
-        with launched(given("launch_file"), *given("arguments").split()):
-            found = fixes.wait_for_number(count, LONG_PATIENCE)[:count]
-            truth.wait_for(lambda message: message.header.stamp >= found[-1].header.stamp)
+        launch(self.addCleanup, given("launch_file"), *given("arguments").split())
+        found = fixes.wait_for_number(count, LONG_PATIENCE)[:count]
+        truth.wait_for(lambda message: message.header.stamp >= found[-1].header.stamp)
         fixed, there = stamps_and_places(found)[1], true_places(truth.messages, found)
         errors = np.hypot(*((fixed - fixed[0]) - (there - there[0])).T)[1:]
         variances = np.array([variance(fix) for fix in found])
