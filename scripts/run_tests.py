@@ -78,7 +78,7 @@ def steps() -> List[Step]:
         Step("ruff check", ["ruff", "check", "--quiet", "."], load=Load.ALONE),
         Step("ruff format", ["ruff", "format", "--quiet", "--check", "."], load=Load.ALONE),
         _pytest("unit tests", "test/unit", "-m", "not long", *IN_PARALLEL),
-        _pytest("stopping", "test/stopping/test_stop.py", "test/stopping/test_map_bag_stop.py"),
+        _pytest("stopping", "test/stopping/test_stop.py"),
         *oldest_versions(),
         _pytest("without ROS", "test/without_ros", load=Load.SPARE),
         _pytest("long tests", *_long(), "-m", "long", *IN_PARALLEL, load=Load.SPARE),

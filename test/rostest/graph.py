@@ -120,11 +120,6 @@ class Inbox:
                 if not self._condition.wait(max(end - time.monotonic(), 0.0)):
                     raise AssertionError(f"{self._topic}: nothing that fits in {timeout} s; {seen} messages came")
 
-    def next(self) -> Any:
-        """Return the next message; raises AssertionError when it does not come."""
-        start = len(self.messages)
-        return self.wait_for_number(start + 1)[start]
-
     def wait_for_number(self, number: int, timeout: float = PATIENCE) -> List[Any]:
         """Return all messages once at least `number` have come; raises AssertionError after `timeout` seconds."""
         with self._condition:
@@ -198,10 +193,9 @@ def publisher(topic: str, kind: type, listeners: int = 1) -> rospy.Publisher:
     return made
 
 
-def wait_for_listeners(publisher: rospy.Publisher, number: int = 1) -> None:
+def wait_for_listeners(made: rospy.Publisher, number: int = 1) -> None:
     """Wait until `number` nodes are connected to a publisher of this process."""
-    told = f"{publisher.name}: not {number} connections"
-    wait_until(lambda: publisher.get_num_connections() >= number, told=told)
+    wait_until(lambda: made.get_num_connections() >= number, told=f"{made.name}: not {number} connections")
 
 
 def wait_for_links(topic: str, number: int = 1) -> None:
@@ -257,18 +251,12 @@ def wait_until(
 @contextmanager
 def launched(launch_file: str, *arguments: str) -> Iterator[None]:
     """Run a launch file of the package: what a test listens to from before the first message to the last one."""
-    command = ["roslaunch", PACKAGE, launch_file, *arguments]
-    launch = subprocess.Popen(command, stdin=subprocess.DEVNULL)
+    running = subprocess.Popen(["roslaunch", PACKAGE, launch_file, *arguments], stdin=subprocess.DEVNULL)
     try:
         yield
     finally:
-        launch.terminate()
-        launch.wait(timeout=PATIENCE)
-
-
-def process_of(node: str) -> int:
-    """Return the process of a node."""
-    return xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node)).getPid("/graph_test")[2]
+        running.terminate()
+        running.wait(timeout=PATIENCE)
 
 
 def launch(clean_up: Callable[..., Any], launch_file: str, *arguments: str) -> None:
@@ -278,18 +266,23 @@ def launch(clean_up: Callable[..., Any], launch_file: str, *arguments: str) -> N
     clean_up(running.__exit__, None, None, None)
 
 
+def process_of(node: str) -> int:
+    """Return the process of a node."""
+    return xmlrpc.client.ServerProxy(rosgraph.Master("/graph_test").lookupNode(node)).getPid("/graph_test")[2]
+
+
 def rows(cloud: Any) -> np.ndarray:
     """Return the points of a float32 PointCloud2 as (n, fields), sorted, so that clouds can be compared."""
     data = np.frombuffer(cloud.data, dtype=np.float32).reshape(-1, len(cloud.fields))
     return data[np.lexsort(data.T[::-1])]
 
 
-def end_publishing(publisher: rospy.Publisher) -> None:
+def end_publishing(made: rospy.Publisher) -> None:
     """Unregister a publisher of this process, and wait until those that listened have noticed.
 
     They would take a new publisher of the topic for the old one, whose connections they have, and not connect again.
     """
-    topic = publisher.resolved_name
-    publisher.unregister()
+    topic = made.resolved_name
+    made.unregister()
     told = f"{topic}: still connected"
     wait_until(lambda: not any(_others(node, topic, "i") for node in nodes_of(topic)[1]), told=told)

@@ -94,7 +94,7 @@ def steps(run: Replayed, fixes: Inbox) -> List[Step]:
     found, counts = [], np.cumsum([update.result is not None for update in run.updates])
     for update, count in zip(run.updates, counts):
         wait = partial(fixes.wait_for_number, int(count))
-        found.append(Step(update.scan.reference_time + run.estimator.lookahead + AFTERWARDS, wait))
+        found.append((update.scan.reference_time + run.estimator.lookahead + AFTERWARDS, wait))
     return found
 
 

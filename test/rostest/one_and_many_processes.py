@@ -9,7 +9,7 @@ from typing import Any, Dict
 import numpy as np
 import rosbag
 from graph import TEST_DATA, Inbox, launched, rows, run, wait_for_links
-from playback import Step, play
+from playback import play
 from scipy.spatial import cKDTree
 from sensor_msgs.msg import Image, LaserScan, PointCloud2
 from std_msgs.msg import Float32
@@ -138,7 +138,7 @@ def _made(processes: str, folder: Path) -> Dict[str, Any]:
             wait_for_links(f"/sonar/scan/{topic}", listeners)
         with rosbag.Bag(str(BAG)) as bag:
             moments = np.arange(bag.get_start_time(), bag.get_end_time(), SECONDS)
-        play(BAG, 15.0, [Step(moment, wait) for moment in moments], LISTENERS[processes])
+        play(BAG, 15.0, [(moment, wait) for moment in moments], LISTENERS[processes])
         # Images come more often than turns.
         made = {name: inbox.wait_for_number(SCANS)[-1] for name, inbox in inboxes.items()}
         stamp = made["cleaned"].header.stamp

@@ -3,10 +3,9 @@
 import threading
 from argparse import Namespace
 from collections import deque
-from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
-from typing import Callable, List, Sequence
+from typing import Callable, List, Sequence, Tuple
 
 import genpy
 import rospy
@@ -21,12 +20,8 @@ from recordings.ros.play_bag import Played, read_messages
 QUEUE_SIZE = 100000
 
 
-@dataclass(frozen=True)
-class Step:
-    """What is waited for before messages that were recorded after `time` [s] are played."""
-
-    time: float
-    wait: Callable[[], object]
+Step = Tuple[float, Callable[[], object]]
+"""What is waited for before messages that were recorded after a time [s] are played."""
 
 
 def play(bag: Path, rate: float, steps: Sequence[Step], listeners: int = 1) -> None:
@@ -43,15 +38,15 @@ def play(bag: Path, rate: float, steps: Sequence[Step], listeners: int = 1) -> N
         wait_for_links(topic, len(nodes_of(topic)[1]))
     start, now, pace = messages[0].time, -1.0, Pace(rate, threading.Event().wait)
     for played in messages:
-        while left and played.time > left[0].time:
-            left.popleft().wait()
+        while left and played.time > left[0][0]:
+            left.popleft()[1]()
         pace.wait_for(played.time - start)
         if played.time > now:
             now = played.time
             publishers[topics.CLOCK].publish(Clock(genpy.Time.from_sec(now)))
         publishers[played.topic].publish(played.message)
-    for step in left:
-        step.wait()
+    for _, wait in left:
+        wait()
 
 
 @lru_cache(maxsize=1)

@@ -3,11 +3,12 @@
 import math
 import random
 import time
-from typing import Any, Callable, Dict, List
+from typing import Any, Callable, Dict
 
 import genpy
 import numpy as np
-from geometry_msgs.msg import Quaternion, TransformStamped
+from geometry_msgs.msg import Quaternion
+from messages import beam, transform
 from rosgraph_msgs.msg import Clock
 from roslib.message import get_message_class
 from sensor_msgs.msg import Imu, JointState, LaserScan
@@ -123,10 +124,8 @@ class RandomMessages:
         return Clock(genpy.Time(stamp.secs, min(stamp.nsecs, 999_999_999)))
 
     def _beam(self) -> SonarScanLine:
-        beam = SonarScanLine(maxrange_meters=50.0, range_resolution=1.0, angle=self._random.uniform(-4.0, 4.0))
-        beam.header.stamp, beam.header.frame_id = genpy.Time.from_sec(time.time()), "sonar"
-        beam.intensities = bytes(self._random.choice((3, 120)) for _ in range(50))
-        return beam
+        angle = self._random.uniform(-4.0, 4.0)
+        return beam(time.time(), angle, bytes(self._random.choice((3, 120)) for _ in range(50)))
 
     def _cloud(self) -> StampedIntensityCloud:
         now, count = time.time(), self._random.choice((0, 2, 60))
@@ -151,11 +150,5 @@ class RandomMessages:
         return compass
 
     def _transforms(self) -> TFMessage:
-        transforms: List[TransformStamped] = []
-        for _ in range(self._random.choice((1, 1, 3))):
-            transform = TransformStamped(child_frame_id=self._random.choice(FRAMES[:5]))
-            transform.header.frame_id = self._random.choice(FRAMES[:5])
-            transform.header.stamp = genpy.Time.from_sec(time.time())
-            transform.transform.rotation.w = 1.0
-            transforms.append(transform)
-        return TFMessage(transforms=transforms)
+        pairs = [self._random.choices(FRAMES[:5], k=2) for _ in range(self._random.choice((1, 1, 3)))]
+        return TFMessage([transform(*frames, seconds=time.time()) for frames in pairs])
