@@ -21,7 +21,7 @@ from soaking.processes import held
 ATTEMPTS = 8
 # Steps of a loop, and how many s of processor time they take on the machine for which limits of shares are given.
 STEPS, SECONDS = 1000000, 0.06
-MOST_SHARE = 5.0  # percent of a processor as fast as that of SECONDS
+MOST_SHARE = 5.0
 # One turn of the 852: travel there and back over 5 m, 27 bytes out and 513 back at 115200 baud.
 FASTEST_RATE = 1.0 / (2 * 5.0 / 1500.0 + (27 + 513) * 10 / 115200)
 # A turn of a real Ping360 at 2 m takes 9 s (manufacturer's specification).
@@ -35,7 +35,10 @@ LOSSES = ("timeouts", "bad frames", "unexpected replies",
 
 @dataclass(frozen=True)
 class DriverLoad:
-    """rate: beams per second. share: percent of a processor. lost: what the driver counted in the meantime."""
+    """rate: beams per second. share: percent of a processor as fast as that of SECONDS.
+
+    lost: what the driver counted in the meantime.
+    """
 
     rate: float
     share: float

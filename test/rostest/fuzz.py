@@ -59,7 +59,7 @@ class Fuzz(unittest.TestCase):
         self._publish()
         self._expect_all_alive()
         self._expect_a_scan()
-        # A timer of its own sends it.
+        # A timer of its own sends map -> odom.
         Inbox("/tf", TFMessage).wait_for(_is_correction)
         self._expect_no_internal_error()
         self._expect_all_alive()

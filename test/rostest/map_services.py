@@ -13,6 +13,8 @@ from graph import Inbox, publisher, run, wait_until
 from messages import still_cloud
 from nav_msgs.msg import MapMetaData, OccupancyGrid
 from nav_msgs.srv import GetMap
+from rosgraph_msgs.msg import Log
+from std_msgs.msg import Bool
 from std_srvs.srv import Trigger
 from tf2_msgs.msg import TFMessage
 from visualization_msgs.msg import Marker, MarkerArray
@@ -108,6 +110,18 @@ class MapServices(unittest.TestCase):
         """Return how many blocks get_region finds within a metre of a place on the diagonal."""
         region = rospy.ServiceProxy("/mlsm_core/get_region", GetRegion)
         return region(Point(place - 1, place - 1, -5), Point(place + 1, place + 1, 5)).cloud.width
+
+    def test_matching_is_turned_on_and_off_by_a_message(self) -> None:
+        """Again and again, until the log, too, is connected."""
+        starter, log = publisher("/startMatching", Bool), Inbox("/rosout", Log)
+
+        def are_said() -> bool:
+            for turned in (True, False):
+                starter.publish(turned)
+            said = {line.msg for line in log.messages}
+            return {"mlsm_core: matching is on", "mlsm_core: matching is off"} <= said
+
+        wait_until(are_said)
 
     def test_a_grid_is_sent_to_who_asks_for_it(self) -> None:
         """Two cells are occupied, nothing else is known."""

@@ -27,7 +27,10 @@ def seconds_to_stop(launch_file: str, arguments: List[str], log: Path) -> float:
 
 
 def seconds_of(command: List[str], nodes: Set[str], log: Path) -> float:
-    """Return the seconds from SIGINT until a command that starts a master and nodes has ended."""
+    """Return the seconds from SIGINT until a command that starts a master and nodes has ended.
+
+    Raises AssertionError for nodes that do not come.
+    """
     port = free_port()
     uri = f"http://localhost:{port}"
     environment = {**os.environ, "ROS_MASTER_URI": uri, "ROS_LOG_DIR": str(log.parent)}
