@@ -11,14 +11,14 @@ from typing import Any, List, NamedTuple, Optional, Tuple
 import numpy as np
 from matplotlib.figure import Figure
 
-from benchmarks.harness import Row, benchmark_parser, print_table, say
+from benchmarks.harness import Row, say
 from benchmarks.programs import free_port, running, wait_for_graph, wait_until
 
 _WANTED = "<= 150 ms at 95 %"
 _GAP = 1.0  # s from a position on either side: what lies between is drawn as not sent
 
 
-def measured(seconds: float, picture: Optional[Path]) -> List[Row]:
+def rows(seconds: float = 60.0, picture: Optional[Path] = None) -> List[Row]:
     """Return the rows of a run of so many seconds after the first position; picture: where to draw it, a PNG."""
     with running() as programs:
         connection = f"udpin:127.0.0.1:{free_port()}"
@@ -149,12 +149,3 @@ def _moments(stamps: np.ndarray, odometry: np.ndarray) -> np.ndarray:
 
 def _told(seconds: np.ndarray) -> str:
     return " and ".join(f"{round(1e3 * value)} ms" for value in np.percentile(seconds, [50.0, 95.0]))
-
-
-def main() -> None:
-    """Print the table."""
-    parser = benchmark_parser("autopilot", __doc__)
-    parser.add_argument("--seconds", type=float, default=60.0, help="how long to measure after the first position")
-    parser.add_argument("--picture", type=Path, help="a PNG of what was sent, beside the truth")
-    options = parser.parse_args()
-    print_table(measured(options.seconds, options.picture))

@@ -15,8 +15,11 @@ from typing import Iterator, List, Sequence, Tuple
 
 import numpy as np
 
+from benchmarks.harness import Row, SkippedError
 from benchmarks.programs import Programs, running, wait_until
 
+KILOBITS = 256
+WANTED = 10.0  # s, until a change is at the far end
 VEHICLE, TOPSIDE, _MASK = "10.213.77.1", "10.213.77.2", 30
 _NOBODY = "02:00:00:00:00:01"  # what is sent to this address is lost, and no sender learns of it
 _EARLY = 1.0  # s
@@ -25,16 +28,16 @@ Version = Tuple[float, str, int]
 
 
 class Cable:
-    """Carries `kilobits` a second in each direction between this network and one with a computer of its own."""
+    """Carries KILOBITS a second in each direction between this network and one with a computer of its own."""
 
-    def __init__(self, kilobits: int) -> None:
+    def __init__(self) -> None:
         self._space, self._near, self._far = (f"umc{os.getpid()}{end}" for end in ("n", "a", "b"))
-        self._shaped = ["root", "tbf", "rate", f"{kilobits}kbit", "burst", "4kb", "latency", "2s"]
         self.far_end = ["ip", "netns", "exec", self._space]
         """What a command begins with that runs on the far computer."""
 
     def lay(self) -> None:
         """Make the network."""
+        shaped = ["root", "tbf", "rate", f"{KILOBITS}kbit", "burst", "4kb", "latency", "2s"]
         for command in (
             ["ip", "netns", "add", self._space],
             ["ip", "link", "add", self._near, "type", "veth", "peer", "name", self._far, "netns", self._space],
@@ -43,8 +46,8 @@ class Cable:
             [*self.far_end, "ip", "address", "add", f"{TOPSIDE}/{_MASK}", "dev", self._far],
             [*self.far_end, "ip", "link", "set", self._far, "up"],
             [*self.far_end, "ip", "link", "set", "lo", "up"],
-            ["tc", "qdisc", "add", "dev", self._near, *self._shaped],
-            [*self.far_end, "tc", "qdisc", "add", "dev", self._far, *self._shaped],
+            ["tc", "qdisc", "add", "dev", self._near, *shaped],
+            [*self.far_end, "tc", "qdisc", "add", "dev", self._far, *shaped],
         ):
             _run(command)
 
@@ -81,19 +84,16 @@ def _run(command: Sequence[str]) -> None:
     subprocess.run(command, check=True, stderr=subprocess.DEVNULL)
 
 
-def cannot_be_laid(study: str) -> bool:
-    """Return, and say, whether this machine lacks what a cable needs. Also: ended by a signal, it is removed."""
-    signal.signal(signal.SIGTERM, signal.default_int_handler)
-    lacks = os.geteuid() or not shutil.which("tc") or not shutil.which("ip")
-    if lacks:
-        print(f"{study}: skipped: it makes a network of its own, which needs root, ip and tc (package iproute2)")
-    return bool(lacks)
-
-
 @contextmanager
-def demo_behind(kilobits: int, folder: str) -> Iterator[Tuple[Cable, Programs]]:
-    """Lay a cable, and run demo.launch in real time at its near end. Both end with the block."""
-    cable = Cable(kilobits)
+def demo_behind(folder: str) -> Iterator[Tuple[Cable, Programs]]:
+    """Lay a cable, and run demo.launch in real time at its near end; raises SkippedError where it cannot be laid.
+
+    Both end with the block, also where a signal ends it.
+    """
+    if os.geteuid() or not shutil.which("tc") or not shutil.which("ip"):
+        raise SkippedError("it makes a network of its own, which needs root, ip and tc (package iproute2)")
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    cable = Cable()
     try:
         cable.lay()
         os.environ["ROS_IP"] = VEHICLE
@@ -119,15 +119,17 @@ def arrivals(made: List[Version], came: List[Version], numbers: Sequence[int]) -
 
     Where nothing holds the cable up, they may be there before the listener at the near end has noted them.
     """
-    return np.array([max(_arrival(made, came, number), made[number][0]) for number in numbers])
+    found = []
+    for number in numbers:
+        at, key, _ = made[number]
+        good = {shown for _, other, shown in made[number:] if other == key}
+        there = (then for then, other, shown in came if then >= at - _EARLY and other == key and shown in good)
+        found.append(max(next(there, np.inf), at))
+    return np.array(found)
 
 
-def _arrival(made: List[Version], came: List[Version], number: int) -> float:
-    at, key, _ = made[number]
-    good = {shown for _, other, shown in made[number:] if other == key}
-    return next((then for then, other, shown in came if then >= at - _EARLY and other == key and shown in good), np.inf)
-
-
-def told(seconds: np.ndarray) -> str:
-    """Return median, 95 % and most (n,) [s] in words."""
-    return f"{np.median(seconds):.1f} s, {np.percentile(seconds, 95):.1f} s, {seconds.max():.1f} s"
+def delays(made: List[Version], came: List[Version], numbers: Sequence[int]) -> Tuple[Row, np.ndarray]:
+    """Return the row of how long the versions `numbers`, changed tiles, took to the far end, and these times (k,) s."""
+    seconds = arrivals(made, came, numbers) - np.array([made[number][0] for number in numbers])
+    told = f"{np.median(seconds):.1f} s, {np.percentile(seconds, 95):.1f} s, {seconds.max():.1f} s"
+    return (f"delay of {len(seconds)} changed tiles, median, 95 %, most", told, f"<= {WANTED:g} s"), seconds

@@ -1,16 +1,19 @@
-"""Prints how honest the joint solver is in straight canals, whose walls do not tell the way along them.
+"""How honest the joint solver is in straight canals, whose walls do not tell the way along them.
 
 A vehicle with a compass alone goes from one basin through a canal, 200 m long and 20 m wide, into another basin.
 """
 
-from typing import Tuple
+from itertools import product
+from typing import Iterator, Tuple
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser, placed
-from benchmarks.paths import live_figures, solved_live
+from benchmarks.harness import placed
+from benchmarks.paths import judged, replay_input
 from benchmarks.twin_conditions import TwinParameters, lasting, reported
 from benchmarks.twin_water import RESOLUTION, Water, heard, water_of
+from mlsm_manager.joint_solver.live_solver import LiveSolver
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.scan_matching.scan import Track
@@ -29,7 +32,7 @@ _BEAM_SECONDS, _BEAM_ANGLE, _BIN = 0.069, np.radians(1.8), 0.1  # of the recorde
 _START_NS = 10**12
 
 
-def made_canal(posts: int, rng: np.random.RandomState) -> Water:
+def _made_canal(posts: int, rng: np.random.RandomState) -> Water:
     """Return two basins with a canal between them, and `posts` posts along its walls."""
     origin = np.array([-_BASIN[0], -_BASIN[1] / 2.0]) - _MARGIN
     size = np.array([LENGTH + 2.0 * _BASIN[0], _BASIN[1]]) + 2.0 * _MARGIN
@@ -45,7 +48,7 @@ def made_canal(posts: int, rng: np.random.RandomState) -> Water:
     return water_of(free, origin)
 
 
-def made_path(rng: np.random.RandomState) -> Track:
+def _made_path(rng: np.random.RandomState) -> Track:
     """Return the path of a vehicle that goes ahead, from waypoint to waypoint, not quite straight."""
     left, poses = list(_WAYPOINTS), [np.array([-20.0, 8.0, 2.0])]
     count = 20000
@@ -63,37 +66,37 @@ def made_path(rng: np.random.RandomState) -> Track:
     return Track(_START_NS * 1e-9 + _STEP * np.arange(len(poses)), np.array(poses))
 
 
-def recording(posts: int, seed: int, binary: bool) -> Tuple[Recording, Track]:
-    """Return what a vehicle with a compass and a scanning sonar records, and its true path."""
-    rng = np.random.RandomState(seed)
-    water, truth = made_canal(posts, rng), made_path(rng)
-    return recorded_along(truth, water, binary, rng, np.array([0.0, 0.0, 1.0])), truth
-
-
-def recorded_along(
-    truth: Track, water: Water, binary: bool, rng: np.random.RandomState, known: np.ndarray
-) -> Recording:  # fmt: skip
-    """Return what is recorded along a path; known: (3,) 0 for what is not reported of x, y and yaw, else 1."""
-    conditions = TwinParameters(range_scale=0.0, delay=0.0, binary=binary)
+def _recorded_along(truth: Track, water: Water, rng: np.random.RandomState) -> Recording:
+    """Return what a vehicle with a compass and a scanning sonar records along a path."""
+    conditions = TwinParameters(range_scale=0.0, delay=0.0)
     stamps = np.arange(truth.times[0], truth.times[-1] - 2.0, _BEAM_SECONDS)
     bearings = np.angle(np.exp(1j * _BEAM_ANGLE * np.arange(len(stamps))))
     strengths = heard(water, truth.at(stamps), bearings, np.zeros(2), conditions, rng)
-    track = Track(truth.times, reported(truth, conditions, rng).poses * known)
+    track = Track(truth.times, reported(truth, conditions, rng).poses * [0.0, 0.0, 1.0])
     rows = zip(stamps, bearings, strengths)
     beams = [Beam(round(1e9 * time), "sonar", bearing, row, _BIN) for time, bearing, row in rows]
     return Recording(placed(beams, track, np.eye(4)), 0, track, None)
 
 
-def main() -> None:
-    """Print one line per run."""
-    parser = benchmark_parser("canals", __doc__)
-    parser.add_argument("--posts", type=int, nargs="+", default=[0, 12], help="along the canal (default: 0 and 12)")
-    parser.add_argument("--seeds", type=int, default=3, help="runs with each number of posts (default: %(default)s)")
-    parser.add_argument("--graded", action="store_true", help="echoes with strengths instead of plateaus")
-    arguments = parser.parse_args()
-    for posts in arguments.posts:
-        for seed in range(arguments.seeds):
-            made, truth = recording(posts, seed, not arguments.graded)
-            solver = solved_live(made, OdometryKind.HEADING)
-            found = live_figures(solver, truth.at, lambda times, path=truth: path.at(times)[:, 0] > 0.0)
-            print(f"{posts} posts, seed {seed}, from the canal on: {found.line()}", flush=True)
+def lines(posts: Tuple[int, ...] = (0, 12), seeds: int = 3) -> Iterator[str]:
+    """Yield the figures of the joint solver's live path from the canal on. posts: along it. seeds: runs with each."""
+    for count, seed in product(posts, range(seeds)):
+        rng = np.random.RandomState(seed)
+        water, truth = _made_canal(count, rng), _made_path(rng)
+        recording = _recorded_along(truth, water, rng)
+        scans, parameters = replay_input(recording, OdometryKind.HEADING)
+        solver = LiveSolver(parameters.solver_parameters(), RunLog(recording.sonar_in_base))
+        for scan in scans:
+            solver.add(scan)
+        path = np.array([estimate.T_map_base[:2] for estimate in solver.estimates])
+        covariances = np.array([estimate.pose_covariance[:2, :2] for estimate in solver.estimates])
+        places = truth.at(solver.log.node_times)[:, :2]
+        # Both paths begin at one place.
+        aligned = places[1:] - places[0] + solver.log.node_poses(np.array([0]))[0, :2]
+        chosen = places[1:, 0] > 0.0
+        found = judged(path[chosen], aligned[chosen], covariances[chosen])
+        yield (
+            f"{count} posts, seed {seed}, from the canal on: {found.mean:.2f} m in the mean, {found.most:.2f} m at "
+            f"most, shape {found.shape:.2f} m, NEES per state {found.nees:.2f}; stated deviation {found.stated:.2f} m, "
+            f"{found.stated_most:.2f} m at most; within three of them {100.0 * found.within:.0f} %"
+        )

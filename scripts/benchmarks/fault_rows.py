@@ -42,19 +42,15 @@ class FaultRow:
         """Return name and fault for a recording of so many seconds; drawn at random with `rng`, else as usual."""
         size, arguments, share = self.size, dict(self.others), 0.5
         if rng is not None:
-            size, share = _other(self, rng.uniform(*_SIZES)), rng.uniform(*_TIMES)
+            factor, share = rng.uniform(*_SIZES), rng.uniform(*_TIMES)
+            size = float(size**factor) if self.is_factor else factor * size
+            size = min(size, _SHARE) if self.keyword == "share" else size
         if self.keyword:
             arguments[self.keyword] = type(self.size)(size)
         if self.begins:
             arguments["at"] = float(round(share * seconds))
         time = f" at {arguments['at']:.0f} s" if self.begins and rng is not None else ""
         return self.text.format(f"{size:.3g}") + time, partial(self.make, **arguments)
-
-
-def _other(row: FaultRow, factor: float) -> float:
-    if row.is_factor:
-        return float(row.size**factor)
-    return min(factor * row.size, _SHARE) if row.keyword == "share" else factor * row.size
 
 
 _JUMPED, _SLIPPED = "odometry jumped", "head slipped|compass stepped"

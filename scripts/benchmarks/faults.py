@@ -1,4 +1,4 @@
-"""Prints what map_bag makes of recordings in which something is broken: how far off it ends, and what it says.
+"""What map_bag makes of recordings in which something is broken: how far off it ends, and what it says.
 
 Each row: the recording and the fault; distance [m] from the path of the unbroken recording, in the mean of the live and
 the refined path, and the refined one's largest; "stated": median of the stated deviation [m]; "covered": share of the
@@ -10,22 +10,20 @@ stated deviations, and "missed" where not.
 """
 
 import re
-from argparse import ArgumentParser
 from collections import Counter
 from dataclasses import replace
 from enum import Enum
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Dict, Iterator, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
-from benchmarks.fault_rows import faults
-from benchmarks.harness import WHOLE_MARINA, benchmark_parser, mapped_as, marina, recorded
+from benchmarks.fault_makers import Fault
+from benchmarks.fault_rows import FaultRow, faults
+from benchmarks.harness import WHOLE_MARINA, mapped_as, marina, recorded
 from benchmarks.tours import simulated
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording, read_recording, track_between
-from mlsm_manager.offline.run_files import position_error
-from mlsm_manager.offline.trust import Trust
 from mlsm_manager.scan_matching.scan import Track
 from recordings.bags.bag import RecordingError
 from recordings.reader import Request
@@ -33,7 +31,7 @@ from recordings.reader import Request
 _COVERS, _MOSTLY = 2.5, 0.95  # stated deviations, which are to hold so large a share of the path
 _TOURS = {"harbour": "harbour_ahead", "basin": "basin_ahead", "turning": "harbour_turning"}
 _COMPASS = " compass"
-_USUAL = ["marina", "harbour"]
+USUAL = ("marina", "harbour")
 SOURCES = [name + form for form in ("", _COMPASS) for name in ("marina", "canal", *_TOURS)]
 
 
@@ -51,20 +49,15 @@ def source(name: str, seconds: float) -> Recording:
 
 def shortened(recording: Recording, seconds: float, begin: float = 0.0) -> Recording:
     """Return some seconds of a recording, from `begin` [s] on."""
-    start = recording.track.times[0] + begin
-    return _between(recording, start, start + seconds)
+    track = track_between(recording.track, recording.track.times[0] + begin, recording.track.times[0] + begin + seconds)
+    first, last = track.times[[0, -1]]
+    beams = [placed for placed in recording.beams if first <= placed.beam.stamp_ns * 1e-9 < last]
+    return replace(recording, beams=beams, track=track)
 
 
 def ending(recording: Recording, seconds: float) -> Recording:
     """Return the last seconds of a recording."""
-    return _between(recording, recording.track.times[-1] - seconds, recording.track.times[-1])
-
-
-def _between(recording: Recording, begin: float, end: float) -> Recording:
-    track = track_between(recording.track, begin, end)
-    first, last = track.times[[0, -1]]
-    beams = [placed for placed in recording.beams if first <= placed.beam.stamp_ns * 1e-9 < last]
-    return replace(recording, beams=beams, track=track)
+    return shortened(recording, seconds, recording.seconds - seconds)
 
 
 class Judged(Enum):
@@ -106,7 +99,9 @@ def outcome(found: MappedBag, whole: MappedBag, named: str) -> Outcome:
     refined = distance(found.run.best, found.run.times, whole, whole.run.best)
     trust = found.findings.trust
     stated = np.interp(found.run.times, trust.times, trust.deviations)
-    covered, cause = float(np.mean(refined <= _COVERS * stated)), _first_cause(trust)
+    covered, cause = float(np.mean(refined <= _COVERS * stated)), trust.assumed.text or "-"
+    if trust.causes:
+        cause = trust.causes[0].line(float(trust.times[0]))
     judged = Judged.MISSED
     if refined.mean() <= float(np.median(whole.findings.trust.deviations)):
         judged = Judged.HELD
@@ -119,52 +114,55 @@ def outcome(found: MappedBag, whole: MappedBag, named: str) -> Outcome:
     )  # fmt: skip
 
 
-def _first_cause(trust: Trust) -> str:
-    if trust.causes:
-        return trust.causes[0].line(float(trust.times[0]))
-    return trust.assumed.text or "-"
+class Broken(NamedTuple):
+    """A recording to be broken. source: its name. whole: as it is. fault: what is broken, with its row."""
+
+    source: str
+    whole: Recording
+    fault: str
+    row: FaultRow
+    make: Fault
+
+    @property
+    def name(self) -> str:
+        """Of the row."""
+        return f"{self.source}: {self.fault}"
 
 
-def fault_parser(name: str, about: str) -> ArgumentParser:
-    """Return a parser of a study that breaks recordings."""
-    parser = benchmark_parser(name, about)
-    parser.add_argument("--rows", default=".", metavar="REGEX", help="which ones, of 'SOURCE: FAULT'; default: all")
-    parser.add_argument("--sources", nargs="+", default=_USUAL, choices=SOURCES, help="default: %(default)s")
-    parser.add_argument("--seconds", type=float, default=600.0, help="of each recording (default: %(default)g)")
-    parser.add_argument("--seed", type=int, help="of other sizes and times than the usual ones")
-    return parser
+def broken_recordings(rows: str, sources: Sequence[str], seconds: float, seed: Optional[int]) -> Iterator[Broken]:
+    """Yield those that a regular expression finds in 'SOURCE: FAULT'. Raises RecordingError for an unknown source."""
+    unknown = sorted(set(sources) - set(SOURCES))
+    if unknown:
+        raise RecordingError(f"{', '.join(unknown)}: must be among {', '.join(SOURCES)}")
+    for name in sources:
+        whole = source(name, seconds)
+        for fault, (row, make) in faults(whole.seconds, seed).items():
+            broken = Broken(name, whole, fault, row, make)
+            if re.search(rows, broken.name):
+                yield broken
 
 
-def main() -> None:
-    """Print the table, line by line, and how many rows are what."""
-    parser = fault_parser("faults", __doc__)
-    parser.add_argument("--truth", action="store_true", help="print the distance from the truth as well")
-    arguments = parser.parse_args()
-    wanted, counts = re.compile(arguments.rows), Counter()
-    for name in arguments.sources:
-        recording, whole = source(name, arguments.seconds), None
-        for fault, (row, make) in faults(recording.seconds, arguments.seed).items():
-            if wanted.search(f"{name}: {fault}"):
-                whole = whole or mapped_as(recording, "--refine")
-                named = row.right_causes(name.endswith(_COMPASS))
-                counts[print_row(f"{name}: {fault}", make(recording), whole, named, arguments.truth)] += 1
-    print(", ".join(f"{counts[judged]} {judged.value}" for judged in Judged))
+def lines(
+    rows: str = ".", sources: Tuple[str, ...] = USUAL, seconds: float = 600.0, seed: Optional[int] = None
+) -> Iterator[str]:  # fmt: skip
+    """Yield the rows that a regular expression finds in 'SOURCE: FAULT', and at last how many of them are what.
 
-
-def print_row(name: str, recording: Recording, whole: MappedBag, named: str, with_truth: bool) -> Judged:
-    """Map a broken recording, print its row, and return what it is."""
-    try:
-        found = mapped_as(recording, "--refine")
-    except RecordingError as refused:
-        print(f"{name:55} refused: {refused}", flush=True)
-        return Judged.HELD
-    row = outcome(found, whole, named)
-    truth = (
-        f"  truth {position_error(found.run.times, found.run.best, recording.truth)['mean']:.2f}" if with_truth else ""
-    )
-    print(
-        f"{name:55} {row.live:6.2f} {row.refined:6.2f} most {row.most:6.2f} stated {row.stated:6.2f} "
-        f"covered {100 * row.covered:3.0f} %{truth}  {row.judged.value}\n    {row.cause}\n    {row.line}",
-        flush=True,
-    )
-    return row.judged
+    seconds: of each recording. seed: of other sizes and times than the usual ones.
+    """
+    counts: Dict[Judged, int] = Counter()
+    unbroken = lru_cache(maxsize=None)(lambda name: mapped_as(source(name, seconds), "--refine"))
+    for broken in broken_recordings(rows, sources, seconds, seed):
+        whole = unbroken(broken.source)
+        try:
+            found = mapped_as(broken.make(broken.whole), "--refine")
+        except RecordingError as refused:
+            counts[Judged.HELD] += 1
+            yield f"{broken.name:55} refused: {refused}"
+            continue
+        row = outcome(found, whole, broken.row.right_causes(broken.source.endswith(_COMPASS)))
+        counts[row.judged] += 1
+        yield (
+            f"{broken.name:55} {row.live:6.2f} {row.refined:6.2f} most {row.most:6.2f} stated {row.stated:6.2f} "
+            f"covered {100 * row.covered:3.0f} %  {row.judged.value}\n    {row.cause}\n    {row.line}"
+        )
+    yield ", ".join(f"{counts[judged]} {judged.value}" for judged in Judged)

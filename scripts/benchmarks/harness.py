@@ -1,13 +1,10 @@
 """What every benchmark shares: where recordings are, timing a call, running a node, and printing a table."""
 
-import argparse
 import os
-import subprocess
 import sys
 import time
-from functools import partial
 from pathlib import Path
-from typing import Callable, List, Tuple
+from typing import Callable, Iterable, List, Tuple, Union
 
 import numpy as np
 
@@ -24,6 +21,10 @@ ROOT = Path(__file__).resolve().parents[2]
 MARINA, WHOLE_MARINA = "marina_first.bag", "marina_whole_blind.bag"
 Row = Tuple[str, str, str]
 """What was measured, the figure with its unit, and what is wanted of it."""
+
+
+class SkippedError(Exception):
+    """A bench cannot be run here; the text says why."""
 
 
 def recorded(name: str) -> Path:
@@ -52,17 +53,6 @@ def mapped_as(recording: Recording, *options: str) -> MappedBag:
     return mapped_bag(recording, map_bag_arguments(["recording", "--out", "nowhere", *options]))
 
 
-def missing_row(name: str) -> Row:
-    """Return the row that stands for figures of a recording that is not there."""
-    return name, "skipped", f"not in {recorded('')}; set UMC_DATA"
-
-
-def run_node(program: str, *arguments: object) -> None:
-    """Run nodes/`program` without its output; raises CalledProcessError."""
-    command = [sys.executable, str(ROOT / "nodes" / program), *map(str, arguments)]
-    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
-
-
 def median_seconds(
     call: Callable[[], object], repeats: int = 20, clock: Callable[[], float] = time.perf_counter
 ) -> float:
@@ -75,27 +65,22 @@ def median_seconds(
     return float(np.median(times))
 
 
-cpu_seconds = partial(median_seconds, repeats=1, clock=time.process_time)
-"""Returns the seconds of a core that a call takes."""
-
-
 def say(words: str) -> None:
     """Tell beside the table what is done now, so that whoever waits knows for what."""
     print(f"{time.strftime('%H:%M:%S')} {words}", file=sys.stderr, flush=True)
 
 
-def print_table(rows: List[Row]) -> None:
-    """Print rows in columns under a heading."""
-    lines = [("figure", "measured", "wanted"), *rows]
-    widths = [max(len(line[column]) for line in lines) for column in range(3)]
-    for index, line in enumerate(lines):
+def print_rows(found: Iterable[Union[str, Row]]) -> None:
+    """Print lines as they come, or a table once it is whole."""
+    table = []
+    for one in found:
+        if isinstance(one, str):
+            print(one, flush=True)
+        else:
+            table.append(one)
+    if not table:
+        return
+    lines = [("figure", "measured", "wanted"), *table]
+    widths = [max(map(len, column)) for column in zip(*lines)]
+    for line in [lines[0], ["-" * width for width in widths], *table]:
         print("  ".join(cell.ljust(width) for cell, width in zip(line, widths)).rstrip())
-        if index == 0:
-            print("  ".join("-" * width for width in widths))
-
-
-def benchmark_parser(name: str, description: str) -> argparse.ArgumentParser:
-    """Return a parser for `scripts/bench NAME`; description: the program's docstring."""
-    return argparse.ArgumentParser(
-        prog=f"scripts/bench {name}", description=description, formatter_class=argparse.RawDescriptionHelpFormatter
-    )

@@ -5,14 +5,14 @@ With --map each recording is mapped too. Its errors are those at the ends of swe
 anything is said of the position; the blind side is the direction in which the statement is widest.
 """
 
-from typing import Iterable, List, NamedTuple, Optional
+import re
+from typing import Iterator, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from benchmarks.harness import ROOT, benchmark_parser, mapped_as
+from benchmarks.harness import ROOT, mapped_as
 from benchmarks.scans import DEPTH, RAYS
-from mlsm_manager.offline.bag_mapping import MappedBag
-from mlsm_manager.offline.recording import Recording, Truth
+from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.run_files import positions_at
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import matrices, wrapped
@@ -48,22 +48,11 @@ _WATERS = {
 _MOTIONS = ("still", "still, fish", "drifting", "moving")
 
 
-class SimulatedHead(NamedTuple):
-    """beams: of a head that turns to and fro. path: where it was, truly."""
+def _simulated_head(motion: str, seed: int, sector: Optional[int]) -> Tuple[Recording, Track]:
+    """Return what a log of a head tells, beams and no motion, and its true path. sector: degrees, if given.
 
-    beams: List[Beam]
-    path: Track
-
-    def recording(self) -> Recording:
-        """Return what a log of it tells: beams, and no motion."""
-        times = self.path.times
-        known = Track(times, np.zeros((len(times), 3)))
-        placed = [PlacedBeam(beam, np.eye(4), False) for beam in self.beams]
-        return Recording(placed, 0, known, Truth(times, self.path.poses[:, :2]))
-
-
-def simulated_head(motion: str, seed: int, sector: Optional[int] = None) -> SimulatedHead:
-    """Return a head of a motion in a water, with sweeps and a place that the seed draws. sector: degrees, if given."""
+    The seed draws water, place and sweeps.
+    """
     rng = np.random.default_rng([seed, _MOTIONS.index(motion)])
     name = list(_WATERS)[seed % len(_WATERS)]
     water = _WATERS[name]
@@ -82,10 +71,10 @@ def simulated_head(motion: str, seed: int, sector: Optional[int] = None) -> Simu
         _add_fish(strengths, path, angles, water, rng)
     echoes = np.minimum(strengths, 255.0).astype(np.uint8)
     beams = [
-        Beam(round(1e9 * time), "sonar", float(angle), one, sonar.range_resolution)
+        PlacedBeam(Beam(round(1e9 * time), "sonar", float(angle), one, sonar.range_resolution), np.eye(4), False)
         for time, angle, one in zip(times, angles, echoes)
     ]
-    return SimulatedHead(beams, path)
+    return Recording(beams, 0, Track(times, np.zeros((len(times), 3))), None), path
 
 
 def _angles(sector: int, sweeps: int, rng: np.random.Generator) -> np.ndarray:
@@ -133,74 +122,52 @@ def _add_fish(strengths: np.ndarray, path: Track, angles: np.ndarray, water: _Wa
         strengths[beam, first : first + 40] += rng.exponential(60.0)
 
 
-class Errors(NamedTuple):
-    """Of the position at the ends of sweeps. far: m, the farthest from where it began. wander: m, of the path told.
+def _errors(head: Recording, path: Track) -> List[float]:
+    """Map a head and return its errors at the ends of sweeps, without the first one, where the map begins.
 
-    squared: mean of the squared error over what is stated, 1 if that is true, NaN where nothing is. blind: the same of
-    the widest direction. covered: share of errors in that direction within what is stated with 95 %.
+    How far the position is from where it began, at most [m]; how far the path told wanders [m]; where a position is
+    told: mean of the squared error over what is stated, 1 if that is true, the same of the widest direction, and the
+    share of errors in that direction within what is stated with 95 %; else NaN.
     """
-
-    far: float
-    wander: float
-    squared: float
-    blind: float
-    covered: float
-
-    @classmethod
-    def of(cls, mapped: MappedBag, truth: Track) -> "Errors":
-        """Return those of a mapped head, without the first sweep, where the map begins."""
-        run, trust = mapped.run, mapped.findings.trust
-        start = truth.poses[0]
-        turn = np.array([[np.cos(start[2]), -np.sin(start[2])], [np.sin(start[2]), np.cos(start[2])]])
-        true = (truth.poses[:, :2] - start[:2]) @ turn
-        errors = (positions_at(run.times, run.best, trust.times) - positions_at(truth.times, true, trust.times))[1:]
-        stated, sides = np.linalg.eigh(trust.covariances[1:])
-        squares = np.einsum("ni,nij->nj", errors, sides) ** 2 / stated
-        wander = np.hypot(*(run.best[:, :2] - run.best[0, :2]).T).max()
-        far, told = float(np.hypot(*errors.T).max()), np.nan if trust.uncertainty is None else 1.0
-        within = told * np.mean(squares[:, 1] <= _WITHIN**2)
-        return cls(far, float(wander), float(told * squares.mean()), float(told * squares[:, 1].mean()), float(within))
+    mapped = mapped_as(head, "--refine")
+    run, trust = mapped.run, mapped.findings.trust
+    start = path.poses[0]
+    turn = np.array([[np.cos(start[2]), -np.sin(start[2])], [np.sin(start[2]), np.cos(start[2])]])
+    true = (path.poses[:, :2] - start[:2]) @ turn
+    errors = (positions_at(run.times, run.best, trust.times) - positions_at(path.times, true, trust.times))[1:]
+    stated, sides = np.linalg.eigh(trust.covariances[1:])
+    squares = np.einsum("ni,nij->nj", errors, sides) ** 2 / stated
+    wander = np.hypot(*(run.best[:, :2] - run.best[0, :2]).T).max()
+    told = np.nan if trust.uncertainty is None else 1.0
+    of_stated = np.array([squares.mean(), squares[:, 1].mean(), np.mean(squares[:, 1] <= _WITHIN**2)])
+    return [np.hypot(*errors.T).max(), wander, *(told * of_stated)]
 
 
-def print_counts(motions: Iterable[str], seeds: Iterable[int], sector: Optional[int], is_mapped: bool) -> None:
-    """Print a row for each motion: how many heads were called what."""
+def lines(
+    rows: str = ".", count: int = 30, first_seed: int = 0, sector: Optional[int] = None, map_: bool = False
+) -> Iterator[str]:  # fmt: skip
+    """Yield for each motion that a regular expression finds how many heads were called what.
+
+    count: heads of each motion. first_seed: others than the published ones. sector: degrees; by default drawn. map:
+    map each head too, and print the errors.
+    """
     names = [motion.value for motion in SweepMotion]
-    print(f"{'motion':14}" + "".join(f"{name:>10}" for name in names))
-    for motion in motions:
-        heads = [simulated_head(motion, seed, sector) for seed in seeds]
-        called = [sweep_shifts(head.beams).motion.value for head in heads]
-        print(f"{motion:14}" + "".join(f"{called.count(name):10}" for name in names), flush=True)
-        if is_mapped:
-            _print_errors(heads, called)
+    yield f"{'motion':14}" + "".join(f"{name:>10}" for name in names)
+    for motion in (one for one in _MOTIONS if re.search(rows, one)):
+        heads = [_simulated_head(motion, seed, sector) for seed in range(first_seed, first_seed + count)]
+        called = [sweep_shifts(head.sent).motion.value for head, _ in heads]
+        yield f"{motion:14}" + "".join(f"{called.count(name):10}" for name in names)
+        for name in sorted(set(called)) if map_ else []:
+            yield _error_line(name, np.array([_errors(*head) for head, one in zip(heads, called) if one == name]))
 
 
-def _print_errors(heads: List[SimulatedHead], called: List[str]) -> None:
-    for name in sorted(set(called)):
-        chosen = [head for head, one in zip(heads, called) if one == name]
-        found = np.array([Errors.of(mapped_as(head.recording(), "--refine"), head.path) for head in chosen])
-        far, wander = np.median(found[:, :2], axis=0)
-        print(
-            f"    called {name:9} error {far:.2f} m median, {found[:, 0].max():.2f} m at most; wander {wander:.2f}, "
-            f"{found[:, 1].max():.2f} m at most",
-            end="",
-        )
-        of_stated = found[np.isfinite(found[:, 2]), 2:]
-        squared, blind, covered = of_stated.mean(axis=0) if len(of_stated) else np.full(3, np.nan)
-        print(
-            f"; position told of {len(of_stated)}: squared error over stated {squared:.2f}, blind side {blind:.2f}, "
-            f"{covered:.0%} of it covered",
-            flush=True,
-        )
-
-
-def main() -> None:
-    """Print the table."""
-    parser = benchmark_parser("heads", __doc__)
-    parser.add_argument("--count", type=int, default=30, help="heads of each motion (default: %(default)s)")
-    parser.add_argument("--first-seed", type=int, default=0, help="others than the published ones")
-    parser.add_argument("--motion", action="append", choices=_MOTIONS, help="only these")
-    parser.add_argument("--sector", type=int, choices=_SECTORS, help="degrees; by default drawn")
-    parser.add_argument("--map", action="store_true", help="map each head too, and print the errors")
-    arguments = parser.parse_args()
-    seeds = range(arguments.first_seed, arguments.first_seed + arguments.count)
-    print_counts(arguments.motion or _MOTIONS, seeds, arguments.sector, arguments.map)
+def _error_line(name: str, found: np.ndarray) -> str:
+    """Return the errors (heads, 5) of those that were called so."""
+    (far, wander), (most, farthest) = (statistic(found[:, :2], axis=0) for statistic in (np.median, np.max))
+    of_stated = found[np.isfinite(found[:, 2]), 2:]
+    squared, blind, covered = of_stated.mean(axis=0) if len(of_stated) else np.full(3, np.nan)
+    return (
+        f"    called {name:9} error {far:.2f} m median, {most:.2f} m at most; wander {wander:.2f}, {farthest:.2f} m at "
+        f"most; position told of {len(of_stated)}: squared error over stated {squared:.2f}, blind side {blind:.2f}, "
+        f"{covered:.0%} of it covered"
+    )

@@ -1,4 +1,4 @@
-"""Prints what is told while a vehicle goes on in whose recording something is broken: is a position ever called good?
+"""What is told while a vehicle goes on in whose recording something is broken: is a position ever called good?
 
 Each row: the recording and the fault; distance [m] of the live positions from those of the unbroken recording, in the
 mean and at most; "told": median of the stated deviation [m]; "covered": share of the positions within 2.5 of it;
@@ -6,14 +6,12 @@ mean and at most; "told": median of the stated deviation [m]; "covered": share o
 how many seconds from the beginning of the fault, or of the run, anything was named.
 """
 
-import re
-from argparse import Namespace
-from typing import List, NamedTuple, Optional
+from functools import lru_cache
+from typing import Iterator, List, NamedTuple, Optional, Tuple
 
 import numpy as np
 
-from benchmarks.fault_rows import faults
-from benchmarks.faults import fault_parser, source
+from benchmarks.faults import USUAL, broken_recordings, source
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state
@@ -41,8 +39,9 @@ class Told(NamedTuple):
     causes: List[str]
 
 
-def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
-    """Return what the live nodes tell of a recording, scan by scan, once there is a fix."""
+def told_by(recording: Recording, kind: OdometryKind) -> List[Told]:
+    """Return what live nodes that are told the kind of the odometry tell, scan by scan, once there is a fix."""
+    parameters = ReplayParameters().changed(profile_values(kind))
     localiser = parameters.build_localiser(recording.sonar_in_base)
     recording, _ = with_steady_head(recording)
     beams = recording.corrected(parameters.part(BeamCorrection))
@@ -56,18 +55,12 @@ def told_by(recording: Recording, parameters: ReplayParameters) -> List[Told]:
         except RefusedInput:
             continue
         localiser.look_for_causes()
-        odometry = recording.track.at(np.array(scan.reference_time))
-        found.append(_told(localiser, scan.reference_time, odometry))
-    return [one for one in found if one is not None]
-
-
-def _told(localiser: Localiser, time: float, odometry: np.ndarray) -> Optional[Told]:
-    now, causes = localiser.place_now(time, odometry), localiser.following.causes()
-    if now is None:
-        return None
-    place = localiser.estimator.belief.theta[POSITION]
-    named = [cause.text for cause in causes if not cause.is_mended]
-    return Told(time, place, now.deviation, is_called_good(localiser, now), named)
+        time, place = scan.reference_time, localiser.estimator.belief.theta[POSITION]
+        now = localiser.place_now(time, recording.track.at(np.array(time)))
+        if now is not None:
+            causes = [cause.text for cause in localiser.following.causes() if not cause.is_mended]
+            found.append(Told(time, place, now.deviation, is_called_good(localiser, now), causes))
+    return found
 
 
 def is_called_good(localiser: Localiser, place: Optional[PlaceNow], is_provisional: bool = False) -> bool:
@@ -92,26 +85,13 @@ def line(told: List[Told], whole: List[Told], begin: float) -> str:
     )
 
 
-def main() -> None:
-    """Print the table, line by line."""
-    arguments = _arguments()
-    parameters = ReplayParameters().changed(profile_values(OdometryKind(arguments.odometry)))
-    for name in arguments.sources:
-        recording = source(name, arguments.seconds)
-        whole = told_by(recording, parameters)
-        for fault, (_, make) in faults(recording.seconds, arguments.seed).items():
-            if re.search(arguments.rows, f"{name}: {fault}"):
-                broken = told_by(make(recording), parameters)
-                begin = recording.track.times[0] + _begin(make)
-                print(f"{name + ': ' + fault:55} {line(broken, whole, begin)}", flush=True)
-
-
-def _begin(make: object) -> float:
-    return float(getattr(make, "keywords", {}).get("at", 0.0))
-
-
-def _arguments() -> Namespace:
-    parser = fault_parser("live_faults", __doc__)
-    kinds = [kind.value for kind in OdometryKind]
-    parser.add_argument("--odometry", default=OdometryKind.AUTO.value, choices=kinds, help="default: %(default)s")
-    return parser.parse_args()
+def lines(
+    rows: str = ".", sources: Tuple[str, ...] = USUAL, seconds: float = 600.0, seed: Optional[int] = None
+) -> Iterator[str]:  # fmt: skip
+    """Yield the rows that a regular expression finds in 'SOURCE: FAULT'; options as of scripts/bench faults."""
+    unbroken = lru_cache(maxsize=None)(lambda name: told_by(source(name, seconds), OdometryKind.AUTO))
+    for broken in broken_recordings(rows, sources, seconds, seed):
+        whole = unbroken(broken.source)
+        told = told_by(broken.make(broken.whole), OdometryKind.AUTO)
+        begin = broken.whole.track.times[0] + getattr(broken.make, "keywords", {}).get("at", 0.0)
+        yield f"{broken.name:55} {line(told, whole, begin)}"

@@ -1,11 +1,11 @@
-"""Maps each recording of a folder as it is, and prints a row: is its map as sharp as its fullest single sweep?"""
+"""Is the map of each recording of a folder, as it is, as sharp as its fullest single sweep?"""
 
 from pathlib import Path
-from typing import List
+from typing import Iterator, List
 
 import numpy as np
 
-from benchmarks.harness import benchmark_parser, mapped_as
+from benchmarks.harness import mapped_as
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.each import recordings_in
 from mlsm_manager.offline.recording import read_recording
@@ -21,7 +21,7 @@ def _cells(places: np.ndarray, side: float) -> int:
     return len(np.unique(np.floor(places / side), axis=0))
 
 
-def blocks_per_metre(places: np.ndarray, side: float) -> float:
+def _blocks_per_metre(places: np.ndarray, side: float) -> float:
     """Return how many blocks of a side [m] surfaces have for each metre, NaN where there are none.
 
     places: (n, 2) m, of echoes or blocks. Thin surfaces have about one metre over the side, blurred ones more, and
@@ -30,7 +30,7 @@ def blocks_per_metre(places: np.ndarray, side: float) -> float:
     return _cells(places, side) / _cells(places, _METRE) if len(places) else np.nan
 
 
-def blur(echoes: np.ndarray, sweep: np.ndarray, side: float) -> float:
+def _blur(echoes: np.ndarray, sweep: np.ndarray, side: float) -> float:
     """Return how many times the blocks of `sweep` the same number of `echoes` fills, NaN for a sweep of no echo.
 
     echoes: (n, 2) m, of all sweeps as placed in the map, `sweep` (k, 2) among them. side: of a block, m. In each cell
@@ -47,17 +47,17 @@ def blur(echoes: np.ndarray, sweep: np.ndarray, side: float) -> float:
     return filled / _cells(sweep, side)
 
 
-def row(name: str, mapped: MappedBag) -> str:
+def _row(name: str, mapped: MappedBag) -> str:
     """Return the row of a recording that was mapped."""
     blocks, run = mapped.run.stored.shown, mapped.run
-    single = [blocks_per_metre(scan.points[:, :2], blocks.resolution) for scan in mapped.replayed.scans]
+    single = [_blocks_per_metre(scan.points[:, :2], blocks.resolution) for scan in mapped.replayed.scans]
     most = int(np.argmax([len(scan.points) for scan in mapped.replayed.scans]))
     solution, smeared = mapped.solution, np.nan
     if solution is not None:
         placed = [solution.heard(scan)[0][:, :2] for scan in mapped.replayed.scans]
-        smeared = blur(np.concatenate(placed), placed[most], blocks.resolution)
+        smeared = _blur(np.concatenate(placed), placed[most], blocks.resolution)
     wander = np.linalg.norm(run.best[:, :2] - run.best[0, :2], axis=1).max()
-    sharp = blocks_per_metre(blocks.mean[:, :2], blocks.resolution)
+    sharp = _blocks_per_metre(blocks.mean[:, :2], blocks.resolution)
     return (
         f"{name:32} {len(single):5} {mapped.replayed.matched:7} {len(blocks):6} {sharp:9.2f} "
         f"{single[most]:7.2f} {smeared:5.2f} {wander:7.2f} {mapped.odometry.name:20} "
@@ -65,20 +65,11 @@ def row(name: str, mapped: MappedBag) -> str:
     )
 
 
-def print_rows(folders: List[Path], options: List[str]) -> None:
-    """Print a row for each recording in folders, or why it has no map."""
-    print(f"{'recording':32} scans matched blocks blocks/m  sweep  blur  wander odometry             trust")
+def lines(folders: List[Path]) -> Iterator[str]:
+    """Yield a row for each recording in folders, or why it has no map."""
+    yield f"{'recording':32} scans matched blocks blocks/m  sweep  blur  wander odometry             trust"
     for path in recordings_in(folders):
         try:
-            print(row(path.name, mapped_as(read_recording(path, Request()), *options)), flush=True)
+            yield _row(path.name, mapped_as(read_recording(path, Request()), "--refine"))
         except (RecordingError, OSError) as error:
-            print(f"{path.name:32} no map: {error}", flush=True)
-
-
-def main() -> None:
-    """Print the table, line by line."""
-    parser = benchmark_parser("logs", __doc__)
-    parser.add_argument("folders", type=Path, nargs="+", help="folders, or recordings")
-    parser.add_argument("--live", action="store_true", help="without --refine")
-    arguments = parser.parse_args()
-    print_rows(arguments.folders, [] if arguments.live else ["--refine"])
+            yield f"{path.name:32} no map: {error}"

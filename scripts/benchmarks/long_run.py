@@ -1,4 +1,4 @@
-"""Prints what a scan costs the localiser, map included, after 100 scans and after many, on a tour that never ends."""
+"""What a scan costs the localiser, map included, after 100 scans and after many, on a tour that never ends."""
 
 import os
 import sys
@@ -8,7 +8,7 @@ from typing import Iterator
 import numpy as np
 from soaking.processes import held
 
-from benchmarks.harness import ROOT, benchmark_parser
+from benchmarks.harness import ROOT
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.offline.replay import ReplayParameters
@@ -19,15 +19,11 @@ sys.path += [str(ROOT / "test/unit"), str(ROOT / "test/unit/mlsm_manager")]
 from made_harbour import weaving
 from made_recordings import ranges_along
 
-SCANS = 10_000
-BEAMS = 60
-_TURN = 14.0
+_BEAMS, _TURN = 60, 14.0  # of the head, s
 _MEASURED_AT = (100, 300, 1000, 3000, 10_000)
-_AVERAGED = 50
-_ODOMETRY_STEP = 0.5
-_AFTER = 2.0
-_NOISE = 0.1
-_DRIFT = 0.02
+_AVERAGED = 50  # scans
+_ODOMETRY_STEP, _AFTER = 0.5, 2.0  # s
+_NOISE, _DRIFT = 0.1, 0.02  # m, rad
 _QUAYS = np.array([[-28.0, -18.0], [30.0, -18.0], [30.0, 20.0], [-28.0, 20.0]])  # m: corners of the harbour
 
 
@@ -38,54 +34,38 @@ class _Live(ReplayParameters):
         return LocaliserParameters.solver_parameters(self)
 
 
-def odometry_path(times: np.ndarray) -> np.ndarray:
+def _odometry(times: np.ndarray) -> np.ndarray:
     """Return the poses (n, 3) by an odometry that goes a little beside the true direction."""
     poses = weaving(times)
     return np.column_stack([rotated(poses[:, :2], np.full(len(times), _DRIFT)), poses[:, 2]])
 
 
-def tour_scans(count: int) -> Iterator[Scan]:
-    """Yield scans of a rectangular harbour, oldest first."""
-    rng = np.random.RandomState(0)
-    for number in range(count):
-        yield _scan(number, rng)
-
-
 def _scan(number: int, rng: np.random.RandomState) -> Scan:
-    stamps = (number + (np.arange(BEAMS) + 1.0) / BEAMS) * _TURN
-    bearings = np.arange(BEAMS) * 2.0 * np.pi / BEAMS
+    """Return a scan of a rectangular harbour."""
+    stamps = (number + (np.arange(_BEAMS) + 1.0) / _BEAMS) * _TURN
+    bearings = np.arange(_BEAMS) * 2.0 * np.pi / _BEAMS
     poses = weaving(stamps)
-    ranges = ranges_along(poses[:, :2], bearings + poses[:, 2], _QUAYS) + rng.normal(0.0, _NOISE, BEAMS)
+    ranges = ranges_along(poses[:, :2], bearings + poses[:, 2], _QUAYS) + rng.normal(0.0, _NOISE, _BEAMS)
     seen = ranges[:, np.newaxis] * np.column_stack([np.cos(bearings), np.sin(bearings)])
-    track_times = np.arange(stamps[0] - 2.0 * _TURN, stamps[-1] + _AFTER, _ODOMETRY_STEP)
-    points = np.column_stack([transformed(odometry_path(stamps), seen), np.zeros(BEAMS), np.full(BEAMS, 100.0)])
-    track = Track(track_times, odometry_path(track_times))
-    return Scan(points, stamps, np.ones(BEAMS, dtype=bool), track, float(stamps[-1]))
+    times = np.arange(stamps[0] - 2.0 * _TURN, stamps[-1] + _AFTER, _ODOMETRY_STEP)
+    points = np.column_stack([transformed(_odometry(stamps), seen), np.zeros(_BEAMS), np.full(_BEAMS, 100.0)])
+    return Scan(points, stamps, np.ones(_BEAMS, dtype=bool), Track(times, _odometry(times)), float(stamps[-1]))
 
 
-def main() -> None:
-    """Print time per scan, memory and error each time a number of scans is reached."""
-    parser = benchmark_parser("long_run", __doc__)
-    parser.add_argument("scans", type=int, nargs="?", default=SCANS, help="default: %(default)s, about ten minutes")
-    scans = parser.parse_args().scans
-    localiser, seconds = _Live().build_localiser(np.zeros(2)), []
-    for number, scan in enumerate(tour_scans(scans), start=1):
-        start = time.process_time()
+def lines(scans: int = 10_000) -> Iterator[str]:
+    """Yield time per scan, memory and error each time some number of scans is reached; all take ten minutes."""
+    localiser, seconds, rng = _Live().build_localiser(np.zeros(2)), [], np.random.RandomState(0)
+    start = np.zeros(1)
+    for number in range(1, scans + 1):
+        scan, begin = _scan(number - 1, rng), time.process_time()
         belief = localiser.take_scan(scan).scan.belief
-        seconds.append(time.process_time() - start)
+        seconds.append(time.process_time() - begin)
         if number in _MEASURED_AT or number == scans:
             spent, most = (1e3 * float(statistic(seconds[-_AVERAGED:])) for statistic in (np.median, np.max))
-            error = position_error(number, belief.theta[:3])
-            memory = held(os.getpid()).memory
-            print(
-                f"{number} scans: {spent:.0f} ms a scan, {most:.0f} ms at most, {memory:.0f} MB, {error:.2f} m from "
-                "the truth", flush=True,
-            )  # fmt: skip
-
-
-def position_error(number: int, T_map_base: np.ndarray) -> float:
-    """Return how far [m] a pose (3,) is from the truth after so many scans; the map begins at the odometry's start."""
-    start, end = np.zeros(1), np.array([number * _TURN])
-    truth = transformed(inverse(weaving(start))[0], weaving(end)[:, :2])
-    found = transformed(inverse(odometry_path(start))[0], T_map_base[np.newaxis, :2])
-    return float(np.hypot(*(found - truth)[0]))
+            # The map begins at the odometry's start.
+            truth = transformed(inverse(weaving(start))[0], weaving(np.array([number * _TURN]))[:, :2])
+            found = transformed(inverse(_odometry(start))[0], belief.theta[np.newaxis, :2])
+            yield (
+                f"{number} scans: {spent:.0f} ms a scan, {most:.0f} ms at most, {held(os.getpid()).memory:.0f} MB, "
+                f"{np.hypot(*(found - truth)[0]):.2f} m from the truth"
+            )

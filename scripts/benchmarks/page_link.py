@@ -1,35 +1,36 @@
 """The page behind a thin link that is cut: demo.launch in real time, and Chromium at the far end of a virtual cable.
 
-The cable carries no more than --kilobits in each direction. It is cut several times, unplugged or losing all, and what
+The cable carries no more than 256 kbit/s in each direction. It is cut several times, unplugged or losing all, and what
 changed meanwhile is followed until the page has it. A second page, without the cable, tells what there was to have.
 With --thin-link thin_link sends rviz the map through the same cable. Needs root, ip and tc.
 """
 
 import asyncio
 import json
+import os
 import signal
 import sys
 import tempfile
 import time
 from contextlib import suppress
 from pathlib import Path
-from typing import List, Tuple
+from typing import List
 from zlib import adler32
 
 import numpy as np
 from tornado.websocket import websocket_connect
 
-from benchmarks import link
-from benchmarks.cable import TOPSIDE, VEHICLE, Version, arrivals, cannot_be_laid, demo_behind, told, versions, wait_for
-from benchmarks.harness import Row, benchmark_parser, print_table, say
-from benchmarks.programs import free_port, study
+from benchmarks import cable
+from benchmarks.harness import Row, say
+from benchmarks.link import LISTENER
+from benchmarks.programs import free_port, module
 from benchmarks.web import HELLO, chromium, first_picture
 
 _GROWN = 60.0  # s of mapping before the page is opened
 _CUTS = ("unplugged", True), ("all lost", False)
-_CUT, _WHOLE = 25.0, 10.0  # s: how long nothing is carried, and until the page shall be whole again
-_BETWEEN = 20.0  # s
-_NEAR, _FAR = "--near", "--far"
+_CUT, _BETWEEN = 25.0, 20.0  # s: how long nothing is carried, and until the next cut
+_READER = module("benchmarks.page_link")
+"""The command that writes what a page gets, "near" the node or behind the cable, "far" from it."""
 _NOW, _TILE = "now", 1  # what is not a tile, and the kind of those that are
 # Adler-32, as zlib has it, of every binary message, with its time.
 _NOTE = """
@@ -43,67 +44,61 @@ connection.read = (data) => {
   noted.push([Date.now() / 1000, key, b * 65536 + a]);
   read.call(connection, data);
 };"""
-Cut = Tuple[str, float, float]
-"""Which kind it was, when it began and when it ended."""
 
 
-def measured(seconds: float, kilobits: int, thin_link: bool) -> List[Row]:
-    """Return the rows of so many seconds of mapping, and of the cuts after them."""
-    with tempfile.TemporaryDirectory() as folder, demo_behind(kilobits, folder) as (cable, programs):
-        made, came, first, seen = (Path(folder, name) for name in ("made", "came", "first", "seen"))
+def rows(seconds: float = 60.0, thin_link: bool = False) -> List[Row]:
+    """Return the rows of so many seconds of mapping, and of the cuts after them. thin_link: it has the same cable."""
+    with tempfile.TemporaryDirectory() as folder, cable.demo_behind(folder) as (wire, programs):
+        made, came, first = (Path(folder, name) for name in ("made", "came", "first"))
         port = free_port()
         programs.launch("web_page.launch", "host:=0.0.0.0", f"port:={port}")
-        programs.start(*study("page_link"), _NEAR, port, made)
-        wait_for(made)
+        programs.start(*_READER, "near", port, made)
+        cable.wait_for(made)
         if thin_link:
             programs.launch("thin_link.launch")
-            programs.start(*cable.far_end, *link.LISTENER, "thin/MLSM/Markers", seen, ROS_IP=TOPSIDE)
+            programs.start(*wire.far_end, *LISTENER, "thin/MLSM/Markers", os.devnull, ROS_IP=cable.TOPSIDE)
         say(f"the vehicle maps for {_GROWN:g} s before the page is opened")
         time.sleep(_GROWN)
-        programs.start(*cable.far_end, *study("page_link"), _FAR, port, came, first)
-        wait_for(came)
+        programs.start(*wire.far_end, *_READER, "far", port, came, first)
+        cable.wait_for(came)
         say(f"the page is open: measuring for {seconds:g} s")
-        before, begin = cable.sent_bytes, time.time()
+        before, begin = wire.sent_bytes, time.time()
         time.sleep(seconds)
-        rate, cuts = (cable.sent_bytes - before) / (time.time() - begin), []
+        rate, cuts = (wire.sent_bytes - before) / (time.time() - begin), []
         for name, unplugged in _CUTS:
             say(f"{name} for {_CUT:g} s, then {_BETWEEN:g} s to become whole")
-            cuts.append((name, *cable.cut(_CUT, unplugged)))
+            cuts.append((name, *wire.cut(_CUT, unplugged)))
             time.sleep(_BETWEEN)
-        found = versions(made), versions(came)
+        found = cable.versions(made), cable.versions(came)
+        reports = np.diff([at for at, key, _ in found[1] if key == _NOW and begin < at < begin + seconds])
         return [
             ("first picture, whole, through the cable", f"{float(first.read_text()):.1f} s", ""),
-            ("on the cable while mapping", f"{rate / 1e3:.1f} kB/s", f"<= {kilobits / 8:g} kB/s"),
-            *_of_changes(*found, begin, begin + seconds),
-            *(_of_cut(*found, cut) for cut in cuts),
+            ("on the cable while mapping", f"{rate / 1e3:.1f} kB/s", f"<= {cable.KILOBITS / 8:g} kB/s"),
+            cable.delays(*found, _tiles(found[0], begin, begin + seconds - cable.WANTED))[0],
+            ("between two reports of the position, most", f"{reports.max():.1f} s", "<= 1 s"),
+            *(_of_cut(*found, *cut) for cut in cuts),
         ]
 
 
-def _of_changes(made: List[Version], came: List[Version], begin: float, end: float) -> List[Row]:
-    numbers = [number for number, (at, key, _) in enumerate(made) if begin < at < end - _WHOLE and key != _NOW]
-    seconds = arrivals(made, came, numbers) - np.array([made[number][0] for number in numbers])
-    reports = np.diff([at for at, key, _ in came if key == _NOW and begin < at < end])
-    return [
-        (f"delay of {len(numbers)} changed tiles, median, 95 %, most", told(seconds), f"<= {_WHOLE:g} s"),
-        ("between two reports of the position, most", f"{reports.max():.1f} s", "<= 1 s"),
-    ]
+def _tiles(made: List[cable.Version], begin: float, end: float) -> List[int]:
+    """Return the numbers of the tiles that were made between two times."""
+    return [number for number, (at, key, _) in enumerate(made) if begin < at < end and key != _NOW]
 
 
-def _of_cut(made: List[Version], came: List[Version], cut: Cut) -> Row:
+def _of_cut(made: List[cable.Version], came: List[cable.Version], name: str, began: float, ended: float) -> Row:
     """Return after how long the page had all that changed while nothing was carried, and the position again."""
-    name, began, ended = cut
-    numbers = [number for number, (at, key, _) in enumerate(made) if began < at < ended and key != _NOW]
+    numbers = _tiles(made, began, ended)
     position = min((at for at, key, _ in came if key == _NOW and at > ended), default=np.inf)
-    whole = max([position, *arrivals(made, came, numbers)]) - ended
+    whole = max([position, *cable.arrivals(made, came, numbers)]) - ended
     words = f"position after {position - ended:.1f} s, whole with {len(numbers)} tiles after {whole:.1f} s"
-    return f"{name} for {_CUT:g} s", words, f"<= {_WHOLE:g} s"
+    return f"{name} for {_CUT:g} s", words, f"<= {cable.WANTED:g} s"
 
 
 async def _near(port: str, path: str) -> None:
     """Write what a page without the cable gets to the file `path`, until the process is ended."""
     while True:
         try:
-            page = await websocket_connect(f"ws://{VEHICLE}:{port}/live")
+            page = await websocket_connect(f"ws://{cable.VEHICLE}:{port}/live")
             break
         except OSError:
             await asyncio.sleep(0.2)
@@ -119,7 +114,7 @@ async def _near(port: str, path: str) -> None:
 def _far(port: str, path: str, first: str) -> None:
     """Open the page in Chromium, and write what it gets to the file `path`, until the process is ended."""
     with chromium() as browser, open(path, "w") as file:
-        Path(first).write_text(str(first_picture(browser, f"http://{VEHICLE}:{port}/")))
+        Path(first).write_text(str(first_picture(browser, f"http://{cable.VEHICLE}:{port}/")))
         browser.execute_script(_NOTE)
         while True:
             for one in browser.execute_script("return noted.splice(0)"):
@@ -127,20 +122,11 @@ def _far(port: str, path: str, first: str) -> None:
             time.sleep(0.5)
 
 
-def main() -> None:
-    """Print the table."""
-    if sys.argv[1:2] == [_NEAR]:
-        asyncio.run(_near(*sys.argv[2:]))
-    if sys.argv[1:2] == [_FAR]:
-        # Chromium has to end too.
-        signal.signal(signal.SIGTERM, signal.default_int_handler)
-        with suppress(KeyboardInterrupt):
+if __name__ == "__main__":
+    # Chromium has to end too.
+    signal.signal(signal.SIGTERM, signal.default_int_handler)
+    with suppress(KeyboardInterrupt):
+        if sys.argv[1] == "near":
+            asyncio.run(_near(*sys.argv[2:]))
+        else:
             _far(*sys.argv[2:])
-        return
-    parser = benchmark_parser("page_link", __doc__)
-    parser.add_argument("--seconds", type=float, default=60.0, help="how long to measure before the cable is cut")
-    parser.add_argument("--kilobits", type=int, default=256, help="that the link carries in a second")
-    parser.add_argument("--thin-link", action="store_true", help="send rviz the map through the same cable")
-    options = parser.parse_args()
-    if not cannot_be_laid("page_link"):
-        print_table(measured(options.seconds, options.kilobits, options.thin_link))

@@ -56,9 +56,9 @@ def running(host: str = "localhost", before: str = "") -> Iterator[Programs]:
         programs.end()
 
 
-def study(name: str) -> List[str]:
-    """Return the command that runs `scripts/bench NAME` in another process."""
-    return [sys.executable, "-m", "benchmarks", name]
+def module(name: str) -> List[str]:
+    """Return the command that runs a module in another process."""
+    return [sys.executable, "-m", name]
 
 
 def wait_for_graph() -> None:

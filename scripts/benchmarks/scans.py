@@ -91,11 +91,14 @@ class ScanMaker:
     ) -> Scan:  # fmt: skip
         """Return the scan of head turn number `turn`, its points placed by the odometry."""
         times, angles = head_turn(turn)
-        beams, ranges, heights = self._echoes(true_pose(times), angles, seed)
+        sonar = self.sonar(seed)
+        strengths = sonar.pings(at_depth(true_pose(times)), angles)
+        echoes, _ = extract_echoes(strengths, sonar.range_resolution, self._extraction)
+        beams, ranges = echoes.beams, (echoes.bins + 0.5) * sonar.range_resolution
         poses = odometry(times)
         arms = ranges[:, np.newaxis] * np.column_stack([np.cos(angles[beams]), np.sin(angles[beams])])
         places = poses[beams, :2] + rotated(arms, poses[beams, 2])
-        points = np.column_stack([places, np.full(len(ranges), DEPTH), heights])
+        points = np.column_stack([places, np.full(len(ranges), DEPTH), echoes.heights])
         if track is None:
             track = Track(times, poses)
         return Scan(points, times[beams], np.full(len(points), moving), track, float(times[-1]))
@@ -103,12 +106,6 @@ class ScanMaker:
     def sonar(self, seed: int) -> Sonar:
         """Return the sonar with the noise of a seed."""
         return Sonar(self._caster, self._pattern, self._model, np.random.default_rng(seed))
-
-    def _echoes(self, poses: np.ndarray, angles: np.ndarray, seed: int) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Return beam number, range [m] and height of the echoes heard from `poses` (b, 3) at head `angles` (b,)."""
-        sonar = self.sonar(seed)
-        echoes, _ = extract_echoes(sonar.pings(at_depth(poses), angles), sonar.range_resolution, self._extraction)
-        return echoes.beams, (echoes.bins + 0.5) * sonar.range_resolution, echoes.heights
 
 
 def noise_scan(points: int, seed: int) -> Scan:
@@ -121,27 +118,25 @@ def noise_scan(points: int, seed: int) -> Scan:
     return Scan(cloud, times, np.zeros(points, dtype=bool), track, 16.0)
 
 
-class BasinScans:
-    """Scans of 120 beams and 50 m with one spread of the echoes [m]."""
+def basin_cloud(
+    spread: float, T_world_sonar: np.ndarray, seed: int, parameters: SonarToCloudParameters = _ORGANIZED
+) -> Cloud:
+    """Return the full turn of 120 beams and 50 m heard from a (4, 4) pose in the basin, in the world frame.
 
-    def __init__(self, spread: float) -> None:
-        self._caster = _caster("basin")
-        self._parameters = SonarParameters()
-        self._model = make_echo_model("laser_cone", {"spread": spread})
-
-    def scan(self, T_world_sonar: np.ndarray, seed: int, parameters: SonarToCloudParameters = _ORGANIZED) -> Cloud:
-        """Return the full turn heard from a (4, 4) pose, in the world frame; organised unless told otherwise."""
-        head = SonarHead(self._parameters.beams_per_turn, self._parameters.seconds_per_turn)
-        angles = np.array([head.angle(beam) for beam in range(head.beams_per_turn)])
-        sonar = Sonar(self._caster, self._parameters.pattern(), self._model, np.random.default_rng(seed))
-        strengths = sonar.pings(np.repeat(T_world_sonar[np.newaxis], len(angles), axis=0), angles)
-        assembler = ScanAssembler(parameters)
-        for number, angle in enumerate(angles):
-            stamp_ns = 10**12 + round(1e9 * head.time(number))
-            beam = Beam(stamp_ns, "sonar", float(angle), strengths[number], sonar.range_resolution)
-            beam = parameters.corrected(beam)
-            scan = assembler.add(PlacedBeam(beam, T_world_sonar, is_moving=False))
-        return scan
+    spread: of the echoes, m. The cloud is organised unless told otherwise.
+    """
+    usual = SonarParameters()
+    head = SonarHead(usual.beams_per_turn, usual.seconds_per_turn)
+    angles = np.array([head.angle(beam) for beam in range(head.beams_per_turn)])
+    model = make_echo_model("laser_cone", {"spread": spread})
+    sonar = Sonar(_caster("basin"), usual.pattern(), model, np.random.default_rng(seed))
+    strengths = sonar.pings(np.repeat(T_world_sonar[np.newaxis], len(angles), axis=0), angles)
+    assembler = ScanAssembler(parameters)
+    for number, angle in enumerate(angles):
+        stamp_ns = 10**12 + round(1e9 * head.time(number))
+        beam = parameters.corrected(Beam(stamp_ns, "sonar", float(angle), strengths[number], sonar.range_resolution))
+        scan = assembler.add(PlacedBeam(beam, T_world_sonar, is_moving=False))
+    return scan
 
 
 @lru_cache(maxsize=None)

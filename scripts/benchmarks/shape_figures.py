@@ -2,12 +2,12 @@
 
 import math
 from functools import reduce
-from typing import Callable, List, Sequence, Tuple
+from typing import Callable, Iterator, List, Sequence, Tuple
 
 import numpy as np
 
 from benchmarks.harness import Row, median_seconds
-from benchmarks.scans import BasinScans
+from benchmarks.scans import basin_cloud
 from node_support.geometry import pose_matrix
 from sonar_processing.cloud import Cloud
 from sonar_processing.filters.echo_extractor import EchoExtractor, EchoExtractorParameters
@@ -69,58 +69,46 @@ def are_good(errors: Sequence[_Errors]) -> bool:
     return all(distance <= _MOST_DISTANCE and angle <= _MOST_ANGLE for distance, angle in errors)
 
 
-def buoy_error(scans: BasinScans, seed: int, detector: CircleDetector) -> float:
+def buoy_error(spread: float, seed: int, detector: CircleDetector) -> float:
     """Return how far the circle that is nearest to a buoy is from it, m; inf without a circle."""
-    pose, cloud = near_buoy(seed), Thresholder(ThresholderParameters())(scans.scan(near_buoy(seed), seed))
+    pose = near_buoy(seed)
+    cloud = Thresholder(ThresholderParameters())(basin_cloud(spread, pose, seed))
     circles = detector(cloud, lambda times: np.tile(pose[:2, 3], (len(times), 1)))
     offsets = (circle.center - BUOYS[seed % len(BUOYS)] for circle in circles)
     return min((float(np.linalg.norm(offset)) for offset in offsets), default=math.inf)
 
 
-def rows() -> List[Row]:
-    """Return the figures of the shapes."""
-    found: List[Row] = []
+def rows() -> Iterator[Row]:
+    """Yield the figures of the shapes."""
+    cleaning = Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())
     for spread in _SPREADS:
-        scans = [BasinScans(spread).scan(anywhere(seed), seed) for seed in range(_SEEDS)]
-        cleaned = Thresholder(ThresholderParameters()), OutlierRemover(OutlierRemoverParameters())
-        found += _wall_rows(f"spread {spread:g} m, cleaned", scans, cleaned)
-        found += _wall_rows(
-            f"spread {spread:g} m, echoes", scans, [EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))]
-        )
-        found += [row for radii in _RADII for row in _buoy_rows(spread, *radii)]
-    return [*found, _time_row()]
-
-
-def _wall_rows(name: str, scans: Sequence[Cloud], chain: Sequence[Callable[[Cloud], Cloud]]) -> List[Row]:
-    detector = LineDetector(LineDetectorParameters())
-    lines = [detector(reduce(lambda cloud, stage: stage(cloud), chain, scan)) for scan in scans]
-    result = []
-    for reach in _REACHES:
-        errors = [wall_errors(each, anywhere(seed), reach) for seed, each in enumerate(lines)]
-        good = sum(map(are_good, errors))
-        result.append((f"{name}: all walls within {reach:g} m to 0.15 m and 1 deg", f"{good} of {_SEEDS}", "99"))
-        if reach == _REACHES[0]:
-            distances, angles = np.array([one for each in errors for one in each if math.isfinite(one[0])]).T
-            worst = f"{distances.max():.2f} m, {math.degrees(angles.max()):.2f} deg"
-            result.append((f"{name}: greatest errors within {reach:g} m", worst, "0.15 m, 1 deg"))
-    return result
-
-
-def _buoy_rows(spread: float, least: float, most: float) -> List[Row]:
-    detector = CircleDetector(CircleDetectorParameters(min_radius=least, max_radius=most))
-    errors = np.array([buoy_error(BasinScans(spread), seed, detector) for seed in range(_SEEDS)])
-    name = f"spread {spread:g} m: buoy of 0.5 m at 10 m, radius {least:g} to {most:g} m"
-    return [
-        (f"{name}, within 0.15 m", f"{(errors <= _MOST_DISTANCE).sum()} of {_SEEDS}", "99"),
-        (f"{name}, median error of its centre", f"{np.median(errors):.2f} m", "0.15 m"),
-    ]
-
-
-def _time_row() -> Row:
+        scans = [basin_cloud(spread, anywhere(seed), seed) for seed in range(_SEEDS)]
+        yield from _wall_rows(f"spread {spread:g} m, cleaned", scans, cleaning)
+        extractor = EchoExtractor(EchoExtractorParameters(pulse_sigma=spread))
+        yield from _wall_rows(f"spread {spread:g} m, echoes", scans, [extractor])
+        for least, most in _RADII:
+            detector = CircleDetector(CircleDetectorParameters(min_radius=least, max_radius=most))
+            errors = np.array([buoy_error(spread, seed, detector) for seed in range(_SEEDS)])
+            name = f"spread {spread:g} m: buoy of 0.5 m at 10 m, radius {least:g} to {most:g} m"
+            yield f"{name}, within 0.15 m", f"{(errors <= _MOST_DISTANCE).sum()} of {_SEEDS}", "99"
+            yield f"{name}, median error of its centre", f"{np.median(errors):.2f} m", "0.15 m"
     detector = LineDetector(LineDetectorParameters(n_walls=3, probability=1.0, max_iterations=5000))
     cloud = _three_lines(2000, np.random.default_rng(4))
     seconds = median_seconds(lambda: detector(cloud), repeats=30)
-    return "3 lines in 2,000 points, 5,000 hypotheses each", f"{1e3 * seconds:.1f} ms", "20 ms"
+    yield "3 lines in 2,000 points, 5,000 hypotheses each", f"{1e3 * seconds:.1f} ms", "20 ms"
+
+
+def _wall_rows(name: str, scans: Sequence[Cloud], chain: Sequence[Callable[[Cloud], Cloud]]) -> Iterator[Row]:
+    detector = LineDetector(LineDetectorParameters())
+    lines = [detector(reduce(lambda cloud, stage: stage(cloud), chain, scan)) for scan in scans]
+    for reach in _REACHES:
+        errors = [wall_errors(each, anywhere(seed), reach) for seed, each in enumerate(lines)]
+        good = sum(map(are_good, errors))
+        yield f"{name}: all walls within {reach:g} m to 0.15 m and 1 deg", f"{good} of {_SEEDS}", "99"
+        if reach == _REACHES[0]:
+            distances, angles = np.array([one for each in errors for one in each if math.isfinite(one[0])]).T
+            worst = f"{distances.max():.2f} m, {math.degrees(angles.max()):.2f} deg"
+            yield f"{name}: greatest errors within {reach:g} m", worst, "0.15 m, 1 deg"
 
 
 def _three_lines(points: int, rng: np.random.Generator) -> Cloud:

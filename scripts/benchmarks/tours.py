@@ -6,7 +6,7 @@ import numpy as np
 import yaml
 
 from benchmarks.harness import ROOT, placed
-from benchmarks.scans import RAYS, SonarKind
+from benchmarks.scans import KINDS, RAYS, SonarKind
 from benchmarks.twin_conditions import TwinParameters, reported
 from mlsm_manager.offline.recording import Recording, Truth
 from mlsm_manager.scan_matching.scan import Track
@@ -14,7 +14,7 @@ from sonar_processing.beams.beam import Beam
 from sonar_simulator.simulation.robot import RobotDescription
 from sonar_simulator.simulation.simulation import Settings, Simulation
 
-HEAD = SonarKind(500, 0.15, 0.3)  # the demo's
+HEAD = KINDS[0]  # the demo's
 _START = 1000.0  # s
 _MOUNTING, _SCALE = 0.105, 0.01  # rad, relative: deviations of a mounting angle set by eye, and of a DVL's scale
 _STEP = 0.1  # s between poses of the odometry

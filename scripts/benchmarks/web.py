@@ -18,8 +18,8 @@ import numpy as np
 from soaking.processes import held_below
 from tornado.websocket import websocket_connect
 
-from benchmarks.harness import Row, benchmark_parser, print_table, say
-from benchmarks.programs import Programs, free_port, running, wait_for_graph, wait_until
+from benchmarks.harness import Row, say
+from benchmarks.programs import free_port, running, wait_for_graph, wait_until
 
 _PAGES = 10
 HELLO = json.dumps({"hello": {"run": "", "revision": 0}})
@@ -37,7 +37,7 @@ Turn = Dict[str, float]
 """Figures of one turn by name."""
 
 
-def measured(seconds: float, rounds: int) -> List[Row]:
+def rows(seconds: float = 30.0, rounds: int = 2) -> List[Row]:
     """Return the rows of so many rounds of three turns of so many seconds each."""
     port, turns, rates, first = free_port(), [], [], np.nan
     with running(before="taskset -c 0") as programs:
@@ -45,21 +45,22 @@ def measured(seconds: float, rounds: int) -> List[Row]:
         # Pages are on other computers.
         os.sched_setaffinity(0, set(range(1, os.cpu_count() or 1)) or {0})
         figures = Figures()
-        figures.wait()
         say(f"the vehicle maps for {_WARM_UP:g} s first")
         time.sleep(_WARM_UP)
         for number in range(rounds):
             say(f"round {number + 1} of {rounds}: {seconds:g} s each of {', '.join(_TURNS)}")
             turns.append([figures.over(seconds)])
-            with _page_node(programs, port):
-                if number == 0:
-                    time.sleep(_REVOLUTION)
-                    with chromium() as browser:
-                        first = first_picture(browser, f"http://127.0.0.1:{port}/")
-                turns[-1].append(figures.over(seconds))
-                told, watched = asyncio.run(_watched(port, seconds, figures))
-                turns[-1].append(watched)
-                rates += told
+            node = programs.launch("web_page.launch", f"port:={port}")
+            wait_until(lambda: _is_served(port), "the page")
+            if number == 0:
+                time.sleep(_REVOLUTION)
+                with chromium() as browser:
+                    first = first_picture(browser, f"http://127.0.0.1:{port}/")
+            turns[-1].append(figures.over(seconds))
+            told, watched = asyncio.run(_watched(port, seconds, figures))
+            turns[-1].append(watched)
+            rates += told
+            programs.end(node)
     return [
         ("first picture", f"{first:.1f} s", "<= 2 s"),
         ("sent to a page, median, not compressed", f"{np.median(rates) / 1e3:.1f} kB/s", "<= 60 kB/s"),
@@ -68,17 +69,6 @@ def measured(seconds: float, rounds: int) -> List[Row]:
         _compared("CPU time of mapping for each beam", _PER_BEAM, "ms", turns, "the same"),
         *(_compared(f"callback of {one}", one, "ms", turns, "the same") for one in _STAGES),
     ]
-
-
-@contextmanager
-def _page_node(programs: Programs, port: int) -> Iterator[None]:
-    """Run web_page, from when it serves the page to the end of the block."""
-    node = programs.launch("web_page.launch", f"port:={port}")
-    try:
-        wait_until(lambda: _is_served(port), "the page")
-        yield
-    finally:
-        programs.end(node)
 
 
 def _is_served(port: int) -> bool:
@@ -142,13 +132,11 @@ class Figures:
     """CPU times of processes, from the system, and processing times of stages, from /diagnostics."""
 
     def __init__(self) -> None:
-        self._stages: Dict[str, Tuple[float, float]] = {}
-
-    def wait(self) -> None:
         """Wait until the graph runs, and listen."""
         import rospy
         from diagnostic_msgs.msg import DiagnosticArray
 
+        self._stages: Dict[str, Tuple[float, float]] = {}
         wait_for_graph()
         rospy.init_node("web_bench", anonymous=True, disable_signals=True)
         rospy.Subscriber("/diagnostics", DiagnosticArray, self._take, queue_size=100)
@@ -179,12 +167,3 @@ def _processor_seconds() -> Dict[str, float]:
     """Return the CPU seconds of our nodes so far, by name."""
     found = held_below(os.getpid())
     return {node: found[node].cpu for node in ("mapping", "web_page") if node in found}
-
-
-def main() -> None:
-    """Print the table."""
-    parser = benchmark_parser("web", __doc__)
-    parser.add_argument("--seconds", type=float, default=30.0, help="of each turn")
-    parser.add_argument("--rounds", type=int, default=2, help="of the three turns")
-    options = parser.parse_args()
-    print_table(measured(options.seconds, options.rounds))

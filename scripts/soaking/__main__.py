@@ -13,7 +13,7 @@ from typing import List
 import numpy as np
 import rospy
 import yaml
-from benchmarks.harness import print_table
+from benchmarks.harness import print_rows
 from run_demo import ROOT, DemoError, Graph, status_of
 
 from soaking.listening import Listener
@@ -53,7 +53,7 @@ def soak(options: argparse.Namespace, folder: Path) -> bool:
                 raise
             print(f"soak: stopped after {listener.hours:.1f} h; what has been until then:", file=sys.stderr)
         table = rows(samples, listener, (folder / "roslaunch.log").read_text(errors="replace"))
-        print_table([row[:3] for row in table])
+        print_rows(row[:3] for row in table)
         for row in (row for row in table if not row.holds):
             print(f"soak: {row.what}: {row.measured}, wanted {row.wanted}", file=sys.stderr)
         return all(row.holds for row in table)

@@ -1,11 +1,13 @@
 """7.4: a real marina (Ribas et al. 2008), with its odometry and with its compass alone."""
 
 import json
+import subprocess
+import sys
 import tempfile
 from pathlib import Path
 from typing import List
 
-from benchmarks.harness import recorded, run_node
+from benchmarks.harness import ROOT, recorded
 from heading_only import reduce_bag
 
 from thesis_results.page import joined, prose, table
@@ -41,7 +43,8 @@ def make_compass_alone(pictures: Pictures) -> str:
 def _mapped(pictures: Pictures, name: str, bag: Path, *options: str) -> List[str]:
     """Return map and paths, distances from the truth, what the run found of sonar and odometry, and its trust line."""
     with tempfile.TemporaryDirectory() as folder:
-        run_node("map_bag", bag, "--out", folder, "--truth", "/ground_truth", "--refine", *options)
+        command = [sys.executable, ROOT / "nodes/map_bag", bag, "--out", folder, "--truth", "/ground_truth", "--refine"]
+        subprocess.run([*map(str, command), *options], check=True, stdout=subprocess.DEVNULL)
         summary = json.loads((Path(folder) / "summary.json").read_text())
         shown = pictures.copied(
             name, Path(folder) / "map.png",

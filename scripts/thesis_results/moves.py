@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 from functools import partial
-from time import process_time
 from typing import Callable, Dict, List, Sequence
 
 import numpy as np
@@ -15,8 +14,6 @@ from matplotlib.axes import Axes
 from mlsm_manager.localisation.estimator import Estimator
 from mlsm_manager.localisation.keyframe_map import MapSettings
 from mlsm_manager.localisation.thesis_estimator import ThesisEstimator
-from mlsm_manager.offline.map_bag import map_bag_arguments
-from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from mlsm_manager.scan_matching.scan import MatchResult, Scan, Track, corrected_points
 from mlsm_manager.surface_map.blocks import Blocks
@@ -49,7 +46,6 @@ SHOWN = MatcherName.DISTRIBUTIONS
 _SHARP, _THESIS = KINDS[0], KINDS[2]
 _REACH = 29.0  # m: both long walls and the gate are in the picture
 _BEFORE, _AFTER = "#d32f2f", "#2e7d32"
-_CORRECTED = 0.5  # share of the odometry's error
 _GATE = (9.0, 15.0), (-1.7, 1.7)  # m, what the inset shows
 
 
@@ -249,34 +245,4 @@ def session_errors(scans: List[Scan], estimator: Estimator) -> np.ndarray:
         difference = update.result.pose - true_path(np.array([scan.reference_time]))[0]
         squared = difference @ np.linalg.solve(update.belief.covariance[:3, :3], difference)
         rows.append([update.accepted, np.hypot(*difference[:2]), abs(difference[2]), squared])
-    return np.array(rows)
-
-
-def moves_figures() -> List[str]:
-    """Return cells for scripts/bench --no-parameters, of runs mapped with map_bag's defaults.
-
-    Distance, NEES per axis and stated deviation are those at the still scans. A run is corrected from the second scan
-    on if each of its positions is at least twice as near to the truth as the odometry's.
-    """
-    maker, track = ScanMaker("basin", _SHARP), session_track()
-    options = map_bag_arguments(["recording", "--out", "nowhere"])
-    found = [_localised(session_scans(maker, seed, track), options.parameters) for seed in range(SEEDS)]
-    still = np.concatenate([one[np.array(AT_REST)] for one in found])
-    distance, _, nees, stated, seconds = still.T
-    corrected = sum(bool((one[1:, 0] < _CORRECTED * one[1:, 1]).all()) for one in found)
-    numbers = [f"{distance.mean():.2f}", "", "", f"{nees.mean():.2f}", "", f"{np.median(stated):.2f}", ""]
-    return [*numbers, f"{1e3 * np.median(seconds):.0f}", f"{corrected} of {SEEDS} corrected from the second scan on"]
-
-
-def _localised(scans: List[Scan], parameters: ReplayParameters) -> np.ndarray:
-    """Return for each scan (n, 5): distances [m] of the fix and of the odometry, NEES per axis, stated deviation [m],
-    and seconds of a core.
-    """
-    localiser, rows = parameters.build_localiser(), []
-    for scan in scans:
-        start, known = process_time(), localiser.take_scan(scan).scan
-        stated = (known.belief if known.result is None else known.result).covariance[:2, :2]
-        off = known.belief.theta[:2] - true_path(np.array([scan.reference_time]))[0, :2]
-        nees = off @ np.linalg.solve(stated, off) / 2.0
-        rows.append([np.hypot(*off), np.hypot(*wanted(scan)), nees, np.sqrt(np.trace(stated)), process_time() - start])
     return np.array(rows)

@@ -6,7 +6,7 @@ from typing import List
 
 import numpy as np
 from benchmarks.harness import ROOT, recorded_beams
-from benchmarks.scans import BasinScans
+from benchmarks.scans import basin_cloud
 from matplotlib.axes import Axes
 
 from mlsm_manager.offline.thesis_chain import ThesisChain, thesis_values
@@ -41,7 +41,12 @@ _MOST_POINTS = 60_000  # of a picture: more do not show
 def make_simulated(pictures: Pictures) -> str:
     """Return the section of a simulated scan of 50 m."""
     world = load_world(ROOT / "worlds/basin.sdf")
-    found = {name: _scan(spread) for name, spread in _SPREADS.items()}
+    place = _PLACE[:2, 3]
+    found = {
+        name: processed(basin_cloud(spread, _PLACE, 1), place, LineDetectorParameters())
+        for name, spread in _SPREADS.items()
+    }
+    by_thesis = processed(basin_cloud(1.0, _PLACE, 1, CHAIN.clouds), place, _thesis_lines(), CHAIN)
     shown = [
         draw_stages(
             pictures, f"processed_{number}", scan, _REACH,
@@ -55,12 +60,8 @@ def make_simulated(pictures: Pictures) -> str:
         a bit; the default mode multiplies it by `otsu_multiplier`. All parameters are the defaults, but for those of
         the last column, which are the thesis's (`yaml/thesis.yaml`)."""),
         *shown,
-        table(["", *found, _THESIS_COLUMN], _rows([*found.values(), _by_thesis()], world)),
+        table(["", *found, _THESIS_COLUMN], _rows([*found.values(), by_thesis], world)),
     )
-
-
-def _by_thesis() -> "Processed":
-    return processed(BasinScans(1.0).scan(_PLACE, 1, CHAIN.clouds), _PLACE[:2, 3], _thesis_lines(), CHAIN)
 
 
 def _thesis_lines() -> LineDetectorParameters:
@@ -79,6 +80,15 @@ def make_recorded(pictures: Pictures) -> str:
         ]
         for line in scan.lines
     ]  # fmt: skip
+    both = scan, by_thesis
+    counts = [
+        ["threshold that was used", *(f"{one.threshold:.0f}" for one in both)],
+        *(
+            [f"points, {stage}", *(str(np.count_nonzero(one.stages[stage].valid)) for one in both)]
+            for stage in ("thresholded", "cleaned")
+        ),
+        ["walls", *(str(len(one.lines)) for one in both)],
+    ]
     return joined(
         draw_stages(
             pictures, "processed_recording", scan, _TANK_REACH,
@@ -90,15 +100,8 @@ def make_recorded(pictures: Pictures) -> str:
         table(["distance from the sonar", "direction of the normal", "length", "echoes", "rms of residuals"], rows),
         prose("""Of the same turn with the thesis's settings, which are those of a basin: its lines are 1.2 m wide, and
         each bin is drawn ten times."""),
-        table(["", "defaults", "`thesis:=true`"], _counts([scan, by_thesis])),
+        table(["", "defaults", "`thesis:=true`"], counts),
     )  # fmt: skip
-
-
-def _counts(found: List["Processed"]) -> List[List[str]]:
-    rows = [["threshold that was used", *(f"{scan.threshold:.0f}" for scan in found)]]
-    for stage in ("thresholded", "cleaned"):
-        rows.append([f"points, {stage}", *(str(np.count_nonzero(scan.stages[stage].valid)) for scan in found)])
-    return [*rows, ["walls", *(str(len(scan.lines)) for scan in found)]]
 
 
 def _turn(chain: ThesisChain) -> Cloud:
@@ -166,10 +169,6 @@ def _draw_cloud(axes: Axes, cloud: Cloud) -> None:
     points = points[np.argsort(points[:, 3])]
     axes.set_facecolor("black")
     axes.scatter(points[:, 0], points[:, 1], c=points[:, 3], s=1.5, cmap=COLOURS, vmin=0, vmax=STRONGEST, linewidths=0)
-
-
-def _scan(spread: float) -> Processed:
-    return processed(BasinScans(spread).scan(_PLACE, seed=1), _PLACE[:2, 3], LineDetectorParameters())
 
 
 def _rows(found: List[Processed], world: World) -> List[List[str]]:
