@@ -36,9 +36,9 @@ _CHUNK = 100  # nodes whose covariances are found at once, bounds the memory
 class BatchResult:
     """The whole run. steps: how many were taken. converged: the last one was as short as the parameters ask for.
 
-    node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes. run_covariance: (2, 2). told: what the echoes alone
-    tell of the unknowns of a mixture of priors; None without one. log_likelihood: of echoes on surfaces, less that of
-    odd motions.
+    node_times: (n,) s. pose_covariances: (n, 3, 3) of the nodes' poses. run_covariance: (2, 2). told: what the echoes
+    alone tell of the unknowns of a mixture of priors; None without one. log_likelihood: of echoes on surfaces, less
+    that of odd motions.
     """
 
     state: State
@@ -72,6 +72,7 @@ class QuickFit:
         return cls(run, problem.state, steps, converged, problem.log_likelihood())
 
     def with_covariances(self) -> BatchResult:
+        """Return the fit with the covariances of its unknowns."""
         return _result(self.run, _solved_at(self.run, self.state), self.steps, self.converged)
 
 
@@ -90,7 +91,7 @@ class PartResult:
 
 @dataclass(frozen=True)
 class LoopClosure:
-    """batch: the fit that the run speaks for. loops: places visited again that it goes back to.
+    """batch: the fit that the run speaks for. loops: places visited again that it goes back to; none where it does not.
 
     gain: of log likelihood, of the fit with loops over the one without; NaN where none was found.
     """
@@ -226,7 +227,7 @@ class _Batch(Window):
         return float(np.sqrt((moves**2).sum(axis=1).mean()))
 
     def log_likelihood(self, across: float = np.nan) -> float:
-        """See `likelihood_of`."""
+        """Return the log likelihood of the state, see `likelihood_of`."""
         points, pairs = self.met()
         if not np.isnan(across):
             later = self._log.node_times[points.scans] >= across
@@ -243,6 +244,7 @@ class _Batch(Window):
         return equations
 
     def met(self) -> Tuple[PlacedPoints, Pairs]:
+        """Return all points and their comparisons."""
         pairs, points, _ = self._surfaces_met(self._parameters.cut)[-1]
         return points, pairs
 
@@ -266,6 +268,7 @@ class _Batch(Window):
         return moved @ moved.transpose(0, 2, 1)
 
     def told(self) -> Optional[Gaussian]:
+        """Return what the echoes alone tell of the unknowns of a mixture of priors; None without one."""
         mixture = self._odometry.mixture
         if mixture is None:
             return None

@@ -55,7 +55,8 @@ def pairs_of(
 ) -> Pairs:
     """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets` that count.
 
-    Surfaces that face different ways are not compared. Neighbours that are as near share the comparison.
+    Points of one scan are never compared with each other, nor surfaces that face different ways. In its own group, a
+    point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
     """
     own, others = ((np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
     limits = (cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
@@ -90,13 +91,14 @@ def summed(
 ) -> Tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return what the comparisons of each of g pairs of scans say, up to `cut` [m].
 
-    These are the scans of sources (g,) and of targets (g,), their information (g, 14, 14) and gradients (g, 14), by the
-    poses of the source's two nodes, those of the target's two nodes, and the run's unknowns. Pairs whose sources are of
-    one scan must follow each other.
+    These are the scans of sources (g,) and of targets (g,), their information (g, 14, 14) and gradients (g, 14). The
+    columns are the poses of the source's two nodes, those of the target's two nodes, and the run's unknowns. Pairs
+    whose sources are of one scan must follow each other.
 
-    Noise is one of the reported ranges. The residuals are therefore those per unit of range scale, which the derivative
-    by it contains; else the fit would shrink the world to make them smaller. The kernel is Geman and McClure's (1985),
-    wider while the cut is.
+    Noise is one of the reported ranges. The residuals are therefore those per unit of range scale, which the
+    derivative by it contains; else the fit would shrink the world to make them smaller. A beam that meets a surface
+    aslant may have heard it anywhere in its width: such a point is less certain. The kernel is Geman and McClure's
+    (1985), wider while the cut is.
     """
     own = _packed(sources)
     others = own if targets is sources else _packed(targets)
@@ -113,7 +115,7 @@ def _packed(points: PlacedPoints) -> Tuple[np.ndarray, np.ndarray]:
 
 
 def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, parameters: SolverParameters) -> float:
-    """Return the log likelihood of the places of points: what the robust kernel leaves of each comparison."""
+    """Return the log likelihood of the places of points by their comparisons: what the robust kernel leaves of each."""
     i, j = pairs.rows, pairs.neighbours
     residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
     ratio = residual**2 / parameters.variances(sources.slants[i], targets.slants[j])
@@ -134,7 +136,8 @@ _CONFIRMED = (1.0, 3.0)  # of them that heard a point too: from clutter, met by 
 class PostComparisons:
     """Comparisons of echoes that stand alone, as of posts, in free scans with those of all others in view.
 
-    points: these echoes and the scan of each. compared: scans of those that were compared last.
+    They are compared along the line of sight and across it. points: these echoes and the scan of each. compared: scans
+    of those that were compared last.
     """
 
     def __init__(

@@ -1,7 +1,8 @@
 """The compiled search for the nearest points of each group of scans.
 
-Sources of one small square cell have nearly the same neighbours: what may be one of theirs is gathered once for all of
-them. The loops are compiled, or read from the cache on disk, when this module is imported: never while a scan waits.
+Points are sorted into square cells. Sources of one small cell have nearly the same neighbours: what may be one of
+theirs is gathered once for all of them. The loops are compiled, or read from the cache on disk, when this module is
+imported: never while a scan waits.
 """
 
 from collections import namedtuple
@@ -225,7 +226,10 @@ def _write_nearest(blocks, cut, tie, near, candidates, found, made):
 
 @compiled()
 def _in_order(starts, ends, found):
-    """Return rows of sources, rows of their neighbours, distances and shares, source by source."""
+    """Return rows of sources, rows of their neighbours, distances and shares, source by source.
+
+    starts, ends: (n,) where in `found` those of each source stand.
+    """
     count = (ends - starts).sum()
     rows, neighbours = np.empty(count, np.int64), np.empty(count, np.int64)
     distances, shares = np.empty(count), np.empty(count)
@@ -240,6 +244,7 @@ def _in_order(starts, ends, found):
 
 @compiled()
 def _room(points, blocks):
+    """Return room for what lies around a cell, and for what is near its sources."""
     around = _Around(
         np.empty(points, np.int64), np.empty(points), np.empty(blocks, np.int64), np.empty(blocks),
         np.empty(blocks, np.int64), np.empty(blocks), np.empty(blocks),

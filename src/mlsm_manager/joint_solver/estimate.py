@@ -14,15 +14,16 @@ from mlsm_manager.joint_solver.prior_mixture import PriorTerm
 class LiveEstimate:
     """Known from the scan that ended at `time` [s] and those before it.
 
-    T_odom_base, T_map_base: (3,) then, x y [m], yaw [rad]. node: (width,) the newest node's unknowns. run: (2,) the
-    run's. covariance: (width + 2, width + 2) of both. own_covariance: the same if the frozen map had no error.
-    reported_velocity: (3,) m/s, m/s, rad/s that the odometry reported in base_link. drift: how the true motion differs
-    from it. world_scale_deviation: of all lengths. comparisons: number of the scan's points that were compared.
+    T_odom_base: (3,) then, x y [m], yaw [rad]. T_map_base: (3,) then. node: (width,) the newest node's unknowns.
+    run: (2,) the run's unknowns. covariance: (width + 2, width + 2) of both.
+    own_covariance: the same if the frozen map had no error. reported_velocity: (3,) m/s, m/s, rad/s that the odometry
+    reported in base_link. drift: how the true motion differs from it.
+    world_scale_deviation: of all lengths. comparisons: number of the scan's points that were compared with others.
     agreement: share of the scan's points with neighbours in other scans that lie on the surfaces of these. distance: m,
-    their mean distance from these surfaces. surfaces: (2, 2) sum of the outer products of their normals. prior_term:
-    what a mixture of priors added; of no unknowns for models without one. misfit_variance: m^2 in each direction, how
-    uncertain scans that fitted nowhere make the place. doubt: (3, 3) what another odometry adds to the covariance of
-    the pose.
+    mean distance of the scan's points from these surfaces. surfaces: (2, 2) sum of the outer products of their normals.
+    prior_term: what a mixture of priors added; of no unknowns for models without one.
+    misfit_variance: m^2 in each direction, how uncertain scans that fitted nowhere make the place. doubt: (3, 3) what
+    another odometry that the vehicle may have adds to the covariance of the pose.
     """
 
     time: float
@@ -90,13 +91,16 @@ class LiveEstimate:
 
 
 def scale_covariance(poses: np.ndarray, deviation: float) -> np.ndarray:
-    """Return what a relative `deviation` of the world's scale adds to covariances (n, 3, 3) of poses (n, 3) in map."""
+    """Return what an error of the world's scale adds to the covariances (n, 3, 3) of poses (n, 3) in map.
+
+    deviation: of the scale, as a share of 1.
+    """
     lengths = poses * np.array([1.0, 1.0, 0.0])
     return deviation**2 * lengths[:, :, np.newaxis] * lengths[:, np.newaxis]
 
 
 def misfit_covariance(variances: np.ndarray) -> np.ndarray:
-    """Return what an uncertainty of places by `variances` (n,) [m^2] adds to the covariances (n, 3, 3) of poses."""
+    """Return what an uncertainty of the place by `variances` (n,) [m^2] adds to the covariances (n, 3, 3) of poses."""
     return variances[:, np.newaxis, np.newaxis] * np.diag([1.0, 1.0, 0.0])
 
 
@@ -135,9 +139,9 @@ class Turns(NamedTuple):
         cls, estimates: Sequence[Optional[LiveEstimate]], apart: np.ndarray, parts: int, point_counts: np.ndarray,
         most: int,
     ) -> "Turns":  # fmt: skip
-        """Return those of the newest `most` turns in which surfaces were heard whose estimates are not forgotten.
+        """Return the newest `most` turns in which surfaces were heard; point_counts: (n parts,) of the scans.
 
-        point_counts: (n parts,) of the scans.
+        Turns whose estimates are forgotten are left out.
         """
         heard = np.flatnonzero(point_counts.reshape(-1, parts).any(axis=1))[-most:]
         heard = heard[[estimates[turn * parts] is not None for turn in heard]]

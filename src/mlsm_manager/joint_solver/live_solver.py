@@ -104,7 +104,7 @@ class LiveSolver:
         return solver
 
     def begun_with(self, parameters: SolverParameters, log: RunLog) -> "LiveSolver":
-        """Return one that begins where this one began; log: without scans."""
+        """Return a solver with other parameters that begins where this one began; log: without scans."""
         return LiveSolver(parameters, log, self._start, self._known)
 
     @property
@@ -225,6 +225,7 @@ class LiveSolver:
         return max(self.log.scan_count - kept, 0) // _FORGOTTEN_AT_ONCE * _FORGOTTEN_AT_ONCE
 
     def _forget_old(self) -> None:
+        """Forget what no later scan needs."""
         old = self._old_scans
         if old <= self._forgotten_until:
             return
@@ -272,7 +273,7 @@ class LiveSolver:
         return self.search.line() if self.search is not None and self.search.is_certain else ""
 
     def _search(self) -> None:
-        """Put the newest nodes where their scans fit, if the motion is hardly known."""
+        """Put the newest nodes where their scans fit, if the motion is hardly known; or let them begin a submap."""
         if self._parts == 1 and len(self.estimates) > self._silent:
             covariance = self.estimates[-1 - self._silent].own_covariance
             self.search = put_newest(self.solution, covariance, self._silent)

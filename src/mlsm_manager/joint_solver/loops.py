@@ -2,8 +2,8 @@
 
 A scan is laid over what much older scans heard, at all places around its own. A place counts when it is certain, fits
 much better than the present one, and neighbouring scans agree. While the run goes on, the frozen past then moves by
-what its stated covariance expects (the errors of a random walk): nodes that were as certain as the older visit stay,
-and what was lost since then is given back.
+what its stated covariance expects (the errors of a random walk), which needs no solution of the whole run: nodes that
+were as certain as the older visit stay, and what was lost since then is given back.
 """
 
 from dataclasses import dataclass

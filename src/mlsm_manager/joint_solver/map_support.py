@@ -39,9 +39,10 @@ class Surfaces:
         return self.support(sources, places) / sources.qualities.sum()
 
     def support(self, sources: PlacedPoints, places: np.ndarray) -> np.ndarray:
-        """Return how many of n sources (k,) lie on surfaces, the nearest ones, where they are at `places` (k, n, 2).
+        """Return how many of n sources (k,) lie on surfaces where they are at `places` (k, n, 2).
 
-        Each counts by its quality, and in part where it lies a little beside.
+        Each counts by its quality, and in part where it lies a little beside. Of each only the nearest target is
+        looked at.
         """
         distance = self.distances(sources, places, self._parameters.cut, 1)
         return (nearness(distance) * sources.qualities).sum(axis=1)
@@ -72,7 +73,7 @@ def shares_heard_before(solution: Solution, first: int) -> np.ndarray:
     """Return which share (n,) of the points of turns `first` and newer lies on surfaces that those before heard.
 
     Only points count around which a surface was heard that faces the same way: others may be new. NaN for turns with
-    hardly any. A turn is a scan, or all its parts.
+    hardly any such points. A turn is a scan, or all its parts.
     """
     turns = range(first, solution.log.scan_count // solution.parameters.parts_per_turn)
     return np.array([_share(solution, turn) for turn in turns])
@@ -81,9 +82,9 @@ def shares_heard_before(solution: Solution, first: int) -> np.ndarray:
 def misfit_variances(solution: Solution, first: int) -> np.ndarray:
     """Return by how much (n,) [m^2] each of the turns `first` and newer makes the place of all that follows uncertain.
 
-    In each direction. It grows with the share of a turn's points that should lie on what those before it heard and do
-    not, up to as far as a vehicle goes in a turn. It is 0 where the odometry reports distances: such a motion is not
-    lost with a scan.
+    In each direction. It is 0 for a turn that fits to those before it, and grows with the share of its points that
+    should lie on what these heard and do not, up to as far as a vehicle goes in a turn. Where the odometry reports
+    distances it is 0: a motion that is reported is not lost with a scan.
     """
     parts = solution.parameters.parts_per_turn
     times = solution.log.node_times[parts * first :: parts]
@@ -96,7 +97,10 @@ def misfit_variances(solution: Solution, first: int) -> np.ndarray:
 
 @dataclass(frozen=True)
 class FrozenPlaces:
-    """covariances: (f, 3, 3) of the poses of nodes that stay. misfits: (n,) m^2, of the place, for each turn."""
+    """How uncertain nodes are that stay where they were found.
+
+    covariances: (f, 3, 3) of their poses. misfits: (n,) m^2, of the place, for each turn of the head.
+    """
 
     covariances: np.ndarray
     misfits: np.ndarray

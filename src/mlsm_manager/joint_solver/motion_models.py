@@ -1,6 +1,7 @@
 """Motion models: what is unknown of the motion between nodes, and what the odometry says of it.
 
-Here are the interface and what models share; see position_models and velocity_models.
+Here are the interface and the terms that models share. position_models has those of odometries that report positions,
+velocity_models those of which the velocity is unknown.
 """
 
 from dataclasses import dataclass, replace
@@ -38,13 +39,15 @@ class Drift:
 class OdometryModel(Protocol):
     """Interface of the models; what they override is described here.
 
-    Nodes have `width` unknowns: corrections x, y, yaw of the reported pose, then those of the model. The path between
-    two nodes is the model's reference path, turned and scaled by `gain`. reference: returns its positions (m,) x + i y
-    [m]; they are even where the motion is. mixture: priors of some unknowns of a node, of which one holds for the whole
-    run; None where there is one only. rival: the model of another odometry that the vehicle may have; None where its
-    kind was named. compass: how wrong the reported heading may be; None where none is reported. distance_deviation:
-    relative, of reported distances; infinite where none are reported. position_walk: random walk of reported positions,
-    m/sqrt(s).
+    Nodes have `width` unknowns: corrections x, y, yaw of the reported pose, then those of the model.
+
+    The path between two nodes is the model's reference path, turned and scaled by `gain`. reference: returns its
+    positions (m,) x + i y [m]; they are even where the motion is.
+    mixture: priors of some unknowns of a node, of which one holds for the whole run; None where there is one only.
+    rival: the model of another odometry that the vehicle may have; None where its kind was named.
+    compass: how wrong the reported heading may be; None where none is reported.
+    distance_deviation: relative standard deviation of reported distances; infinite where none are reported.
+    position_walk: random walk of reported positions, m/sqrt(s).
     """
 
     width: int
@@ -103,8 +106,8 @@ class Change(NamedTuple):
 class Compass:
     """How wrong the reported heading may be: standard deviations [rad], how long an error lasts [s].
 
-    It errs differently where iron is near. heading_walk: rad/sqrt(s), white noise of the turn rate besides. stuck: s,
-    from when to when it tells nothing.
+    It errs differently where iron is near: for some minutes at the speed of a small vehicle. heading_walk: rad/sqrt(s),
+    white noise of the turn rate besides. stuck: s, from when to when it tells nothing.
     """
 
     heading_deviation: float
@@ -113,7 +116,7 @@ class Compass:
     stuck: Tuple[Tuple[float, float], ...] = ()
 
     def change(self, times: np.ndarray) -> Change:
-        """Return how the correction of the reported heading changes from time to time."""
+        """Return how the correction of the reported heading changes from time to time: an error that lasts, a walk."""
         durations = np.diff(times)
         kept = np.exp(-durations / self.heading_correlation_time)
         variance = self.heading_deviation**2 * (1.0 - kept**2) + self.heading_walk**2 * durations

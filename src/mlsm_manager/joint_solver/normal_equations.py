@@ -52,10 +52,12 @@ class Layout:
 
     @cached_property
     def run_start(self) -> int:
+        """Place of the run's first unknown."""
         return self.width * (self.last - self.first + 1)
 
     @cached_property
     def size(self) -> int:
+        """Number of free unknowns."""
         return self.run_start + RUN_COLUMNS
 
     def node_start(self, node: np.ndarray) -> np.ndarray:
@@ -79,9 +81,10 @@ class Layout:
 
 
 class Residuals(NamedTuple):
-    """m residuals. columns: (m, c) int, of each one's c unknowns, negative for constants. jacobian: (m, c).
+    """m residuals of c unknowns each.
 
-    values, weights: (m,); a weight is the inverse of the variance.
+    columns: (m, c) int, of each residual's unknowns, negative for constants. jacobian: (m, c). values, weights: (m,); a
+    weight is the inverse of the variance.
     """
 
     columns: np.ndarray
@@ -136,7 +139,10 @@ class NormalEquations:
         self._terms.append(information)
 
     def dense(self) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the information of the free unknowns (size, size), and that between them and the held ones."""
+        """Return the information of the free unknowns (size, size), and that between them and the held ones.
+
+        For problems of bounded size.
+        """
         side = self._columns_end + 1
         result = np.zeros((side, side))
         for columns, terms in zip(self._columns, self._terms):
@@ -168,10 +174,10 @@ class EquationSolution:
     to_held: np.ndarray
 
     def covariances(self, columns: np.ndarray, held_covariance: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-        """Return the covariances (b, k, k) of unknowns in `columns` (b, k), and the same if held ones had no error.
+        """Return the covariances (b, k, k) of b sets of unknowns, `columns` (b, k), where held ones err by
+        `held_covariance`, and the same if these had no error.
 
-        held_covariance: by which these err. That is what Schmidt (1966) calls considering parameters that are not
-        estimated.
+        That is what Schmidt (1966) calls considering the parameters that are not estimated.
         """
         sets, each = columns.shape
         unit = np.zeros((len(self.step), columns.size))

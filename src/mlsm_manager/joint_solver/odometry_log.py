@@ -71,17 +71,21 @@ class GrowingTable:
             array.shorten(count)
 
     def keep(self, chosen: np.ndarray) -> None:
+        """Keep the chosen rows, (n,) bool, in little more memory than they need."""
         for array in self._columns.values():
             array.keep(chosen)
 
 
 @dataclass(frozen=True)
 class Motion:
-    """times: (m,) s. poses: (m, 3) T_odom_base. positions: (m,) complex x + i y [m] in odom.
+    """times: (m,) s. poses: (m, 3) T_odom_base. ahead: (m, 2) m, where a vehicle would be that always went ahead.
 
-    ahead: (m, 2) m, where a vehicle would be that always went along the reported heading, at 1 m/s since the run began.
     held: (m,) s, for how long until then positions did not change at all while the heading did, or were lost: the
     odometry told nothing, or the vehicle was at rest.
+
+    positions: (m,) complex x + i y [m] in odom.
+
+    "Ahead" is along the reported heading, at 1 m/s since the run began: a path for an odometry that reports no other.
     """
 
     times: np.ndarray
@@ -176,7 +180,10 @@ class OdometryLog:
 
 
 def _between(times: np.ndarray, known: np.ndarray, values: np.ndarray) -> np.ndarray:
-    """Return values (..., c) at `times` (...) between those (n, c) at `known` (n,); touches only those around."""
+    """Return values (..., c) at `times` (...) between those (n, c) at `known` (n,).
+
+    Only what lies around `times` is touched: the cost does not grow with the run.
+    """
     if times.size and len(known):
         near = _around(known, times.min(), times.max())
         known, values = known[near], values[near]

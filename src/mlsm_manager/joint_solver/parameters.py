@@ -93,6 +93,7 @@ class SolverParameters(JointSolverParameters):
 
     @property
     def free_nodes(self) -> int:
+        """Newest nodes that may still move."""
         return self.free_scans * self.parts_per_turn
 
     @property
@@ -102,6 +103,7 @@ class SolverParameters(JointSolverParameters):
 
     @property
     def frozen_groups(self) -> int:
+        """Older groups of scans that a scan is compared with."""
         return max(self.frozen_scans // self.scans_per_group, 1)
 
     @property
@@ -125,13 +127,16 @@ class SolverParameters(JointSolverParameters):
     def run_deviations(self, log: RunLog) -> np.ndarray:
         """Return (2,) their standard deviations for the echoes of a run.
 
-        Where the odometry reports no distances, the sonar's ranges are the only measure of lengths: their scale is
-        held, see `world_scale_deviation`.
+        Where the odometry reports no distances, the sonar's ranges are the only measure of lengths, and nothing in the
+        run tells how far they are off: their scale is held, see `world_scale_deviation`.
         """
         return np.array([0.0 if self._only_ranges else self._scale_deviation(log), self.sonar_delay_deviation])
 
     def world_scale_deviation(self, log: RunLog) -> float:
-        """Return the standard deviation, stated only, of a scale of ranges and motions that nothing in a run tells."""
+        """Return the standard deviation of a scale of ranges and motions together that nothing in a run can tell.
+
+        It is in the stated covariances only.
+        """
         return self._scale_deviation(log) if self._only_ranges else 0.0
 
     @property

@@ -1,5 +1,8 @@
 """One search over places, for all who ask where scans lie on what other scans heard (correlative search, Olson 2009).
 
+Every place within reach is tried with few points, the best ones again with all and a little aside. A place is certain
+if the points fit there, and at no other place nearly as well.
+
 It is used where the solver's own steps do not reach. A scan whose motion is hardly known is laid on the scans before
 it. After a silence of the sonar it is sought in the whole map, at the places that the motion since then allows; if the
 echoes do not fit at one of them alone, it is better not to know where the vehicle is.
@@ -48,6 +51,7 @@ class PlaceCandidate:
 
     @property
     def is_certain(self) -> bool:
+        """Whether the points fit there, and nowhere else."""
         return self.fit >= max(_FIT, self.elsewhere + _LEAD)
 
     def line(self) -> str:
@@ -146,10 +150,11 @@ def put_newest(solution: Solution, covariance: np.ndarray, silent: int) -> Optio
 
 
 def searched_node(solution: Solution, covariance: np.ndarray, first: int = 0) -> np.ndarray:
-    """Return the newest node (width,), moved to where its scan fits best what the scans from `first` on heard.
+    """Return the newest node (width,), moved to where its scan fits best what the scans before it heard.
 
-    covariance: (width, width) of the node before it. Where the motion is known well the node stays as it is. A place
-    far from the expected one must fit better by what the motion's covariance asks.
+    first: the oldest scan that it is compared with. covariance: (width, width) of the node before it. Where the motion
+    is known well the node stays as it is. A place far from the expected one must fit better by what the motion's
+    covariance asks (correlative search, Olson 2009).
     """
     log, state, newest = solution.log, solution.state, solution.state.nodes[-1]
     last, step = log.scan_count, covariance_since(solution, covariance, 0)

@@ -36,9 +36,10 @@ class PositionOdometry:
     """How wrong an odometry may be of DVL and compass, or one that was reckoned from the commands of the thrusters.
 
     position_walk: m/sqrt(s), integrated noise of its velocities. direction: rad from reported to true motion, as known
-    beforehand, direction_walk: rad/sqrt(s). scale: true over reported distance minus 1, as known beforehand. Of
-    thrusters the speed that a command means changes, and a current carries the vehicle along. scale_walk: 1/sqrt(s).
-    current_deviation: m/s in each direction. current_walk: m/s/sqrt(s).
+    beforehand, direction_walk: rad/sqrt(s). scale: true over reported distance minus 1, as known beforehand.
+
+    The speed that a command means changes with the battery and with what hangs on the vehicle; a current carries it
+    along. scale_walk: 1/sqrt(s). current_deviation: m/s in each direction. current_walk: m/s/sqrt(s).
     """
 
     compass: Compass
@@ -54,7 +55,10 @@ class PositionOdometry:
 
 
 class DvlFactors(OdometryModel):
-    """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly."""
+    """Nodes have columns x, y, yaw, direction [rad] and scale of the odometry: errors that walk slowly.
+
+    The reference path is that of the reported positions.
+    """
 
     width = 5
     reference = attrgetter("positions")

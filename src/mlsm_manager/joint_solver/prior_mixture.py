@@ -53,10 +53,12 @@ class PriorMixture:
 
     The solver holds these unknowns by `widest` (k,) standard deviations about `mean` (k,), and by a term that follows
     from what it knows of them: with it they have mean and covariance of the mixture (the generalised pseudo-Bayes
-    estimator of first order, Bar-Shalom, Li and Kirubarajan 2001, 11.6.4). A component counts only once the echoes tell
-    the unknowns that it knows better than `widest` to `told` (k,): until then a narrow prior that is wrong would draw a
-    map that seems to confirm it. One component has the deviations `widest`. walks: (k,) per root second, how fast what
-    the echoes told is forgotten. rival: a prior that another solver assumes, which is not mixed.
+    estimator of first order, Bar-Shalom, Li and Kirubarajan 2001, 11.6.4).
+
+    A component counts only once the echoes tell the unknowns that it knows better than `widest` to `told` (k,): until
+    then a narrow prior that is wrong would draw a map that seems to confirm it. One component has the deviations
+    `widest`. walks: (k,) per root second, how fast what the echoes told is forgotten. rival: a prior that another
+    solver assumes, which is not mixed; the echoes tell here whether it is right.
     """
 
     columns: Tuple[int, ...]
@@ -94,14 +96,15 @@ class PriorMixture:
         return _term_between(known, Gaussian(mean, covariance))
 
     def _admitted(self, known: Gaussian) -> np.ndarray:
-        """Return which components (c,) may be assumed."""
+        """Return which components (c,) may be assumed: narrow ones once the echoes tell what they are narrow in."""
         told = np.diag(known.covariance) <= self.told**2
         return np.array([(told | (one.deviations >= self.widest)).all() for one in self.components])
 
     def rival_lead(self, known: Gaussian) -> float:
         """Return by how many nats `rival` is likelier than the components where widest prior and echoes say `known`.
 
-        It is the ratio of densities of Savage and Dickey (Dickey 1971): no run that assumes the rival need be asked.
+        It is the ratio of densities of Savage and Dickey (Dickey 1971): no run that assumes the rival need be asked,
+        in which the map would confirm it.
         """
         logs = [self._posterior(known, component)[1] for component in self.components]
         return self._posterior(known, self.rival)[1] - float(np.logaddexp.reduce(logs))
@@ -154,7 +157,11 @@ class AdaptedPrior:
 
 
 def _term_between(known: Gaussian, wanted: Gaussian) -> PriorTerm:
-    """Return the factor that makes `wanted` of `known`; along axes where that knows less, none."""
+    """Return the factor that makes `wanted` of `known`; along axes where that knows less, as between two peaks, none.
+
+    Where all components know the same of an unknown, rounding alone says whether anything is known less: either must
+    come to the same.
+    """
     before, after = np.linalg.inv(known.covariance), np.linalg.inv(wanted.covariance)
     added, axes = np.linalg.eigh(after - before)
     added, axes = added[added > 0.0], axes[:, added > 0.0]

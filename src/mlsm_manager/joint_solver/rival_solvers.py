@@ -54,7 +54,7 @@ class RivalSolvers:
         cls, parameters: SolverParameters, sonar_in_base: np.ndarray, start: Optional[np.ndarray] = None,
         known: Optional[KnownSurfaces] = None,
     ) -> "RivalSolvers":  # fmt: skip
-        """Arguments as LiveSolver's."""
+        """Return those of a new run; arguments as LiveSolver's."""
         solver = LiveSolver(parameters, RunLog(sonar_in_base), start, known)
         return cls(solver, _of_rival(solver))
 
@@ -65,7 +65,7 @@ class RivalSolvers:
 
     @property
     def parameters(self) -> SolverParameters:
-        """What `resumed` needs."""
+        """What `resumed` needs to have both odometries, where there are two."""
         return self.shown.parameters if self.other is None else self._unsure.parameters
 
     @property
@@ -202,7 +202,10 @@ def _as_stored(parameters: SolverParameters, stored: Mapping[str, np.ndarray]) -
 def _added(
     lead: float, poses: np.ndarray, others: np.ndarray, covariances: np.ndarray, other_covariances: np.ndarray
 ) -> np.ndarray:
-    """Return what other poses (n, 3), less likely by `lead` nats, add to covariances (n, 3, 3) of `poses` (n, 3)."""
+    """Return what other poses (n, 3), less likely by `lead` nats, add to the covariances (n, 3, 3) of `poses` (n, 3).
+
+    With it the covariances are those of the squared error where either may be true.
+    """
     apart = others - poses
     share = 1.0 / (1.0 + np.exp(lead))
     return share * (np.einsum("na,nb->nab", apart, apart) + other_covariances - covariances)

@@ -85,8 +85,8 @@ class RunLog:
     """Scan k lies between nodes k and k + 1; node k + 1 is at the time of the scan's last beam.
 
     sonar_in_base: (2,) m. surfaces: points on surfaces. posts: echoes of what is small. Points of scans may be
-    forgotten; the nodes stay. node_times: (scan_count + 1,) s; empty before the first scan. forgotten: (scan_count,)
-    bool, whose points are. The next scan makes both views invalid.
+    forgotten; the nodes stay. scan_count: so far. node_times: (scan_count + 1,) s; empty before the first scan.
+    forgotten: (scan_count,) bool, whose points are. The next scan makes both views invalid.
     """
 
     def __init__(self, sonar_in_base: np.ndarray) -> None:
@@ -186,6 +186,7 @@ class RunLog:
         return other
 
     def node_motion(self, nodes: np.ndarray) -> Motion:
+        """Return what the odometry reported up to `nodes` (n,)."""
         return self.odometry.motion(self.node_times[nodes])
 
     def node_poses(self, nodes: np.ndarray) -> np.ndarray:

@@ -25,10 +25,11 @@ MAP = 0  # the submap of all scans whose place in the map is known
 class Submaps:
     """Which scans are compared with each other: those after a silence wait apart until their place in the map is known.
 
-    Every scan of a run has the number of its submap.
+    Every scan of a run has the number of its submap; a new one begins where nobody knows where the vehicle is.
     """
 
     def __init__(self, numbers: np.ndarray) -> None:
+        """numbers: (n,) of the scans so far."""
         self._numbers: List[int] = [int(number) for number in numbers]
         self._begun = max(self._numbers, default=MAP)
 
@@ -39,11 +40,12 @@ class Submaps:
 
     @property
     def newest(self) -> int:
-        """The submap of the newest scan."""
+        """The submap of the newest scan; that of the map where there is none."""
         return self._numbers[-1] if self._numbers else MAP
 
     @property
     def is_apart(self) -> bool:
+        """Whether the place of the newest scan in the map is not known."""
         return self.newest != MAP
 
     @property
@@ -68,7 +70,7 @@ class Submaps:
         self._numbers[-1] = self._begun
 
     def join(self) -> None:
-        """Put the newest submap into the map."""
+        """Put the newest submap into the map, because its place is known now."""
         joined = self.newest
         self._numbers = [MAP if number == joined else number for number in self._numbers]
 
@@ -116,6 +118,7 @@ class Fixes(Dict[int, Fix]):
                 equations.add_terms(columns[np.newaxis], fix.information[np.newaxis], gradient[np.newaxis])
 
     def stored(self) -> Dict[str, np.ndarray]:
+        """Return what `of_arrays` needs, by name."""
         return {
             _NODES: np.array(list(self), dtype=np.int64),
             _PLACES: np.array([fix.place for fix in self.values()]).reshape(-1, YAW),
@@ -135,6 +138,7 @@ class Solution:
 
     state: the unknowns of the run in `log`. submaps: which of its scans are compared with each other. known: surfaces
     that were in the map before the run. prior_term: what a mixture of priors added to the newest node; None before.
+    fixes: of single scans.
     """
 
     log: RunLog
@@ -155,7 +159,10 @@ class Solution:
         return Solution(self.log.since(scan), self.parameters, state, Submaps(self.submaps.numbers[scan:]))
 
     def placed(self, heard: Tuple[SurfacePoints, np.ndarray]) -> PlacedPoints:
-        """Return points and the scan of each, as the log's tables have them, in the map."""
+        """Return points and the scan of each, as the log's tables have them, in the map.
+
+        They follow from the path between the two nodes of the scan that heard each.
+        """
         (points, scans), log, state = heard, self.log, self.state
         if not len(scans):
             return NO_POINTS
@@ -173,7 +180,7 @@ class Solution:
 
     @property
     def places(self) -> np.ndarray:
-        """(n, 2) m in map, of all nodes."""
+        """Where all nodes are, (n, 2) m in map."""
         return self.node_places(np.arange(len(self.state.nodes)))
 
     def node_places(self, nodes: np.ndarray) -> np.ndarray:
@@ -218,8 +225,9 @@ def _path(
 ) -> Tuple[np.ndarray, np.ndarray]:
     """Return the nodes (n, 8), and poses of the odometry between two times (k, 4), as compiled loops take them.
 
-    times: (n,) s. nodes: (n, width). Between two nodes the path is the model's reference path, turned and scaled by the
-    mean of both gains, and stretched to lead from one to the other. The last gain is that with which it goes on.
+    times: (n,) s. nodes: (n, width). Between two nodes the path is the model's reference path, which is even between
+    the poses, turned and scaled by the mean of both gains, and stretched to lead from one to the other. The last gain
+    is that with which it goes on.
     """
     motion, known = log.path(times, *around)
     places, gain = motion.poses[:, :2] + nodes[:, :2], odometry.gain(nodes)

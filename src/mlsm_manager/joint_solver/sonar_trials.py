@@ -70,6 +70,7 @@ class SonarFault:
         return float(np.arccos(np.exp(-2.0 * np.hypot(*self.sizes))))
 
     def is_beyond(self, _: float) -> bool:
+        """Return whether it is larger than what is usual."""
         if self.kind is SonarKind.TILT:
             return self._tilt > _TILT
         return float(np.linalg.norm(self.sizes)) > (_ARM if self.kind is SonarKind.ARM else _FACTOR)
@@ -86,6 +87,7 @@ class SonarFault:
         return np.array([[1.0 + along, diagonal], [diagonal, 1.0 - along]])
 
     def _wrong(self, times: np.ndarray) -> np.ndarray:
+        """Return at which of `times` (n,) [s] it holds."""
         return np.isnan(self.begin) | (times >= self.begin)
 
     def heard(self, points: SurfacePoints) -> SurfacePoints:
@@ -103,9 +105,11 @@ class SonarFault:
         return replace(points, ranges=ranges, bearings=bearings, normals=normals, slants=slants)
 
     def sonar_in_base(self, told: np.ndarray) -> np.ndarray:
+        """Return where the sonar is, (2,) m, if it was `told` (2,)."""
         return told + self.sizes if self.kind is SonarKind.ARM else told
 
     def logged(self, log: RunLog) -> RunLog:
+        """Return what the run had logged without it."""
         return log.heard_as(self.heard, self.sonar_in_base(log.sonar_in_base))
 
     def placed(self, scan: Scan, sonar_in_base: np.ndarray) -> Scan:
@@ -120,8 +124,8 @@ def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, QuickFit]:
     """Return a run without a fault of its sonar, and its fit.
 
     After a change of ranges it begins where the odometry leads, or, where that tells no distances, with a path that is
-    as much longer: the path that they made may be far from the true one. It may also be near: so it begins from that,
-    too.
+    as much longer: the path that they made may be far from the true one. It may also be near, where some scans met the
+    map: so it begins from that, too.
     """
     changed = replace(run, log=fault.logged(run.log))
     starts = [State(nodes, run.state.run.copy()) for nodes in _starts(run, changed.log, fault)]
@@ -129,6 +133,7 @@ def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, QuickFit]:
 
 
 def _starts(run: Solution, log: RunLog, fault: SonarFault) -> List[np.ndarray]:
+    """Return nodes (n, width) at which a fit without a fault may begin."""
     if fault.kind is not SonarKind.RANGES:
         return [run.state.nodes.copy()]
     if not np.isinf(run.parameters.odometry.distance_deviation):
@@ -168,7 +173,9 @@ def likelihood_across(run: Solution, fitted: State, fault: SonarFault) -> float:
 
 
 def ranges_changed_at(begins: Sequence[float], size: float) -> List[SonarFault]:
-    """Return changes of ranges at each of `begins` [s] by `size`, a logarithm; none where no setting is so large."""
+    """Return changes of the range setting at each of `begins` [s] by `size`, the logarithm of true ranges over reported
+    ones; none where no setting is so large.
+    """
     faults = [SonarFault(SonarKind.RANGES, begin, (size,)) for begin in begins]
     return [fault for fault in faults if fault.is_possible]
 

@@ -38,7 +38,7 @@ class Sights(NamedTuple):
 
     @classmethod
     def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "Sights":
-        """sonar_in_base: (2,) m, where the sonar is in base_link."""
+        """Return those of a scan; sonar_in_base: (2,) m, where the sonar is in base_link."""
         places = transformed(inverse(scan.track.at(scan.times)), scan.points[:, :2]) - sonar_in_base
         ranges, bearings = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
         reach, per_echo = reaches(scan.times, bearings, ranges), points_per_echo(scan.times, ranges)

@@ -44,8 +44,8 @@ class HeadingFactors(OdometryModel):
     """Nodes have columns x, y, yaw, then in base_link the speeds ahead and aside, and the speed of travel [m/s].
 
     The speed ahead forgets its difference from the speed of travel (an Ornstein-Uhlenbeck process), the speed aside
-    itself. Between nodes both speeds change evenly, which is where such a process is expected; what it strays from
-    there by is the variance of the steps. Reported positions are not used.
+    forgets itself. Between nodes both speeds change evenly, which is where such a process is expected; what it strays
+    from there by is the variance of the steps. Reported positions are not used.
     """
 
     width = 6
@@ -112,10 +112,12 @@ class HeadingFactors(OdometryModel):
         return [*self._positions(nodes, motion), changes, self._speeds_ahead(nodes, durations)]
 
     def _kept(self, durations: np.ndarray) -> tuple:
+        """Return which shares (n,) of the speeds ahead and aside are left after `durations` (n,) [s]."""
         times = self._speeds.speed_correlation_time, self._speeds.slip_correlation_time
         return tuple(np.exp(-durations / time) for time in times)
 
     def _changes(self, durations: np.ndarray) -> Dict[int, Change]:
+        """Return how unknowns change from node to node that do not only walk."""
         _, slipping = self._kept(durations)
         return {ASIDE: Change(slipping, self._speeds.slip_deviation**2 * (1.0 - slipping**2))}
 
@@ -203,9 +205,9 @@ class UnaidedFactors(HeadingFactors):
 
 
 def _bridged(deviation: float, time: float, durations: np.ndarray) -> np.ndarray:
-    """Return the variances of the integral over `durations` (n,) of a process that forgets, whose ends are known.
+    """Return the variances of an integral over `durations` (n,) of a process that forgets, whose ends are known.
 
-    It is less the mean of both ends times the duration; for short durations that is a random walk's bridge.
+    The integral less the mean of both ends times the duration; for short durations that is a random walk's bridge.
     """
     return deviation**2 * np.minimum(durations**3 / (6.0 * time), 2.0 * time * durations)
 

@@ -33,8 +33,8 @@ _ALIKE = float(np.cos(0.1))  # cosine of the angle up to which directions are al
 class WeakDirections:
     """The direction about which the surfaces around each scan say least.
 
-    first: the first scan. directions: (s, 2) unit vectors in map of that scan and those after it. lost: (s,) from 0 to
-    1, the share of the information along them that does not count.
+    first: number of the first scan. directions: (s, 2) unit vectors in map of that scan and those after it. lost: (s,)
+    from 0 to 1, the share of the information along them that does not count.
     """
 
     first: int
@@ -122,10 +122,11 @@ def discounted(
     """Return `information` (g, c, c) and `gradient` (g, c) of g pairs of scans without what errors of normals explain.
 
     scans: (g,) the compared scan of each pair. places: (4, 2) columns of x and y of a pair's nodes, first those of the
-    compared scan. normal_deviation: rad. Along the weakest direction of a scan, information counts only as far as it
-    exceeds (2 normal_deviation)^2 times that across it. The rest is taken out as if the scan might lie anywhere along
-    that direction beside the other one: then nothing is said of a turn or a scale of both together, which no comparison
-    can tell.
+    compared scan. normal_deviation: rad, of the surfaces' normals.
+
+    Along the weakest direction of a scan, information counts only as far as it exceeds (2 normal_deviation)^2 times the
+    information across it. The rest is taken out as if the scan might lie anywhere along that direction beside the other
+    one: then nothing is said of a turn or a scale of both together, which no comparison can tell.
     """
     if not len(scans):
         return information, gradient

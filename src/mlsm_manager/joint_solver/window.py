@@ -103,7 +103,7 @@ def superfluous(solution: Solution, first: int, last: int) -> np.ndarray:
 
 
 def fading(distances: np.ndarray, most: int) -> np.ndarray:
-    """Return factors (b,) of groups at `distances` (b,) [m]: 1 for near ones, falling to 0 for all but `most`.
+    """Return factors (b,) of groups at `distances` (b,) [m]: 1 for near ones, falling to 0; at most `most` are above 0.
 
     They depend on the distances continuously. Groups at one distance fade together.
     """
@@ -304,6 +304,7 @@ class Window:
         return [self._estimate(*each) for each in zip(nodes, *covariances)]
 
     def _compared(self, scan: int) -> int:
+        """Return how many points of a scan were compared with those of others."""
         rows = [pairs.rows[sources.scans[pairs.rows] == scan] for pairs, sources, _ in self._met]
         posts = 0 if self._posts is None else np.count_nonzero(self._posts.compared == scan)
         return len(np.unique(np.concatenate(rows))) + posts

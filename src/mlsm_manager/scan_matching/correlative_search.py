@@ -28,8 +28,8 @@ class ScoreField:
     def of_blocks(cls, blocks: Blocks, cell: float, width: float, margin: float) -> "ScoreField":
         """Smooth the blocks with a Gaussian of standard deviation `width`; the grid reaches `margin` beyond them.
 
-        What is as dense all around, as clutter is, is taken away. One block that stands alone counts half as much as a
-        dense wall.
+        What is as dense all around, as clutter is, is taken away: it would say "here" everywhere. One block that
+        stands alone counts half as much as a dense wall.
         """
         centers = blocks.mean[:, :2]
         origin = np.floor((centers.min(axis=0) - margin) / cell) * cell

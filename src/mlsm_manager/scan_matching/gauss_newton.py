@@ -38,7 +38,7 @@ class Fit:
     theta: (8,). covariance: (8, 8), prior included. log_likelihood_gain: nat, of the points over no correspondences,
     where points are taken as independent; `inflation` of them are worth one. prior_cost: nat, minus the prior's
     log-likelihood. inliers: (n,) bool, points that lie on a surface of the map. distances: (n,) m from the nearest
-    block.
+    block. converged: whether the last step was small.
     """
 
     theta: np.ndarray

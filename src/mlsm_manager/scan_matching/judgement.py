@@ -26,7 +26,10 @@ OfMoves = Callable[[np.ndarray], np.ndarray]
 
 
 def significance(matched_shares: OfMoves) -> float:
-    """Return by how many standard deviations the matched share of a fit beats that of other places with any heading."""
+    """Return by how many standard deviations the matched share of a fit beats that of other places.
+
+    The other places lie up to 8 m away with any heading.
+    """
     rng = np.random.default_rng(0)
     places = rng.uniform(-_SHIFT, _SHIFT, (_PLACES, 2))
     moves = np.column_stack([places, rng.uniform(-np.pi, np.pi, _PLACES)])

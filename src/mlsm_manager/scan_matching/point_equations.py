@@ -22,7 +22,8 @@ class Correspondences:
     """The block of the map that each point is compared with, and how far it lies from it.
 
     world: (n, 2) places in map. arms: (n, 2) m from the vehicle to them. nearest: (n,) their blocks, at `distances`
-    (n,) m. metric: (n, 2, 2) inverse covariance. residual: (n, 2) m. squared: (n,) its squared Mahalanobis length.
+    (n,) m. metric: (n, 2, 2) inverse covariance. residual: (n, 2) m. squared: (n,) the residuals' squared Mahalanobis
+    length.
     """
 
     world: np.ndarray
@@ -150,8 +151,9 @@ class PointEquations:
     def map_share(self, nearest: np.ndarray) -> np.ndarray:
         """Return the share of the points' information that is left after the map's own noise.
 
-        nearest: (k n,), the blocks of the points at k places, one place after the other. k points of a scan that are
-        compared with the same m points of the map err by s^2/k + s^2/m together; the fit cannot see the second part.
+        nearest: (k n,), the blocks of the points at k places, one place after the other.
+        k points of a scan that are compared with the same m points of the map err by s^2/k + s^2/m together, and the
+        fit cannot see the second part.
         """
         window = self._target.window[nearest][:, np.newaxis]
         apart = np.tile(self._apart, (len(nearest) // len(self._apart), 1))

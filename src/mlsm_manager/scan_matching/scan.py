@@ -47,6 +47,7 @@ class Track:
         return bool(np.ptp(self.poses[:, :2], axis=0).max() > _ROUNDING)
 
     def with_poses(self, poses: np.ndarray) -> "Track":
+        """Return the track with other poses (m, 3)."""
         return replace(self, poses=poses)
 
     def at(self, times: np.ndarray) -> np.ndarray:
@@ -227,11 +228,12 @@ class Belief:
 class MatchResult:
     """Where a scan was taken. Only an `accepted` one says more than what was believed before.
 
-    belief: at the scan's reference time, what was believed before included. velocity: (3,) in the vehicle's frame at
-    that time, m/s, m/s, rad/s. covariance: (6, 6) of [pose, velocity]. error: mean distance of the used points from the
-    map, m. seconds: time the match took. reason: one line that says why a match was not accepted, with the value that
-    decided; empty when it was. beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base then; between them the
-    path is linear.
+    belief: at the scan's reference time, what was believed before included.
+    velocity: (3,) in the vehicle's frame at the reference time, m/s, m/s, rad/s.
+    covariance: (6, 6) of [pose, velocity].
+    error: mean distance of the used points from the map, m. seconds: time the match took.
+    reason: one line that says why a match was not accepted, with the value that decided; empty when it was accepted.
+    beam_times, beam_poses: (b,) s increasing and (b, 3) T_map_base at those times; between them the path is linear.
     """
 
     status: MatchStatus

@@ -2,9 +2,9 @@
 
 Of the 2015 code only evident slips are mended: a block's height was compared with the mean of its x, stamps fell out of
 step with points, the branch for a vehicle at rest never translated, and the first pose whose error was below the
-threshold was taken. What the thesis leaves open: echoes that the map does not have do not count (see belonging). While
-the vehicle is still the error of all points is that of one pose; while it moves it grows along a line over time, whose
-slope is the velocity that is missing (figures 6.6 to 6.8).
+threshold was taken, however much better the next one was. What the thesis leaves open: echoes that the map does not
+have do not count (see belonging). While the vehicle is still the error of all points is that of one pose; while it
+moves it grows along a line over time, whose slope is the velocity that is missing (figures 6.6 to 6.8).
 """
 
 import time
@@ -69,9 +69,9 @@ class ClosestBlocks:
 def belonging(places: np.ndarray, targets: np.ndarray, resolution: float) -> np.ndarray:
     """Return (n,) bool: which places (n, 2) and targets (n, 2) [m] are pairs, and no echo that the map does not have.
 
-    The thesis pairs every point (6.5.6). Its noise echoes then pull still scans up to 0.2 m along walls; so only pairs
-    count that are within three medians (as by Zhang 1994), or within one cell, as points and their blocks are when a
-    map is drawn.
+    The thesis pairs every point (6.5.6). Its noise echoes then pull still scans up to 0.2 m along walls, even from the
+    true pose; so only pairs count that are within three medians (as by Zhang 1994), or within one cell, as points and
+    their blocks are when a map is drawn (6.5.6).
     """
     distance = np.linalg.norm(targets - places, axis=1)
     return distance <= max(resolution, _MEDIANS * float(np.median(distance)))
@@ -92,9 +92,9 @@ def translate_segments(
     """Return the translations (n, 2) [m] that segments of points need, and slope (2,) [m/s] of the last, 0 if still.
 
     times: (n,) s, increasing or equal. moving: (n,) bool; a segment is a run of equal values. errors: (n, 2) m from
-    each point to its block. counted: (n,) bool, whose errors count; a segment without any goes on as the one before. A
-    still segment moves by its mean error; a moving one starts where the segment before it ended and goes on along a
-    line.
+    each point to its block. counted: (n,) bool, whose errors count; a segment without any goes on as the one before.
+    A still segment moves by its mean error (the centroids' difference); a moving one starts with the translation that
+    the segment before it ended with and goes on along a line.
     """
     translations = np.zeros((len(times), 2))
     slope = np.zeros(2)
