@@ -15,7 +15,7 @@ from benchmarks.faults import USUAL, broken_recordings, source
 from mlsm_manager.localisation.localiser import Localiser
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, profile_values
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state
-from mlsm_manager.offline.mended_recording import with_steady_head
+from mlsm_manager.offline.heard_scans import with_steady_head
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.offline.replay import ReplayParameters
 from mlsm_manager.scan_matching.scan_path import POSITION

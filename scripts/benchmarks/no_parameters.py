@@ -87,7 +87,7 @@ def _compass(tour: str, seed: int) -> Recording:
 def _outcome(recording: Recording, named: Sequence[str]) -> Tuple[List[float], str]:
     """Map a recording whose truth is known; return the numbers of its row, and what was found of its odometry."""
     mapped = mapped_as(recording, "--refine", *named)
-    updates, batch = mapped.replayed.updates, mapped.refined.batch
+    updates, batch = mapped.replayed.updates, mapped.refined.motion.fit
     path = np.array([update.belief.theta[:2] for update in updates])
     stated = [update.belief if update.result is None else update.result for update in updates]
     live = _judged(
@@ -96,7 +96,7 @@ def _outcome(recording: Recording, named: Sequence[str]) -> Tuple[List[float], s
     )  # fmt: skip
     # As map_bag states it, with other paths that are possible.
     covariances = batch.pose_covariances[:, :2, :2] + mapped.refined.motion.spread(batch.node_times)
-    path = mapped.refined.solution.node_places(np.arange(len(batch.node_times)))
+    path = mapped.refined.motion.run.node_places(np.arange(len(batch.node_times)))
     refined = _judged(recording, batch.node_times[1:], path[1:], covariances[1:])
     milliseconds = 1e3 * float(np.median(mapped.replayed.seconds))
     numbers = [

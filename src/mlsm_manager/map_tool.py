@@ -14,7 +14,7 @@ from georeferencing.origin import STORED
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.formats import ENDINGS, GEOTIFF, ExportOptions, export
 from mlsm_manager.surface_map.export.pictures import ColorBy, has_screen, show
-from mlsm_manager.surface_map.map_file import StoredMap, read_map
+from mlsm_manager.surface_map.map_file import read_map
 from mlsm_manager.surface_map.operations import LevelTransform, cropped, difference, merged
 from node_support.files import check_output
 from node_support.help import CommandLine, ending_in_one_line
@@ -30,30 +30,27 @@ def run_map_tool() -> None:
             read = [getattr(options, name) for name in ("map", "first", "second") if name in options]
             check_output(options.out, read, options.overwrite)
         lines = _COMMANDS[options.command](options)
-    _tell(lines)
-
-
-def _tell(lines: List[str]) -> None:
-    """Print lines to whoever reads them to the end or, as `head` does, does not."""
     try:
         print("\n".join(lines), flush=True)
     except BrokenPipeError:
-        # Python flushes again at its end, and would complain then.
+        # Whoever reads, such as `head`, stopped to do so; Python flushes again at its end, and would complain then.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-def info_lines(path: Path, stored: StoredMap) -> List[str]:
-    made = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(stored.made)) if stored.made else "at a time not known"
-    lines = [f"{path}: frame {stored.frame}, made {made}"]
-    lines += [f"  {layer.value}: {_layer_line(blocks)}" for layer, blocks in stored.layers.items()]
-    lines += [f"  mark: {mark.name!r} at {mark.x:.1f}, {mark.y:.1f} m" for mark in stored.marks]
-    lines += [f"  calibration: {name} = {value}" for name, value in sorted(stored.calibration.items())]
-    lines += [] if stored.origin is None else [f"  origin: {stored.origin}"]
-    lines += [
-        f"  with {name} {'x'.join(map(str, array.shape))}"
-        for name, array in sorted(stored.arrays.items())
-        if name != STORED
-    ]
+def _info(options: Namespace) -> List[str]:
+    lines = []
+    for path in options.maps:
+        stored = read_map(path)
+        made = "at a time not known"
+        if stored.made:
+            made = time.strftime("%Y-%m-%d %H:%M:%S", time.localtime(stored.made))
+        lines.append(f"{path}: frame {stored.frame}, made {made}")
+        lines += [f"  {layer.value}: {_layer_line(blocks)}" for layer, blocks in stored.layers.items()]
+        lines += [f"  mark: {mark.name!r} at {mark.x:.1f}, {mark.y:.1f} m" for mark in stored.marks]
+        lines += [f"  calibration: {name} = {value}" for name, value in sorted(stored.calibration.items())]
+        lines += [] if stored.origin is None else [f"  origin: {stored.origin}"]
+        arrays = {name: array for name, array in sorted(stored.arrays.items()) if name != STORED}
+        lines += [f"  with {name} {'x'.join(map(str, array.shape))}" for name, array in arrays.items()]
     return lines
 
 
@@ -64,10 +61,6 @@ def _layer_line(blocks: Blocks) -> str:
     high = [*((blocks.cells.max(axis=0) + 1) * blocks.resolution), blocks.height.max()]
     box = ", ".join(f"{axis} {start:.1f} to {end:.1f} m" for axis, start, end in zip("xyz", low, high))
     return f"{len(blocks)} blocks of {blocks.resolution:g} m, {blocks.count.sum()} points, {box}"
-
-
-def _info(options: Namespace) -> List[str]:
-    return [line for path in options.maps for line in info_lines(path, read_map(path))]
 
 
 def _view(options: Namespace) -> List[str]:

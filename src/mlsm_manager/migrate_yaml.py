@@ -3,7 +3,7 @@
 import argparse
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Mapping, Optional, Tuple, Type
+from typing import Any, Dict, List, Mapping, Optional, Type
 
 import yaml
 
@@ -45,25 +45,24 @@ class Key:
     remark: str = ""
     also: str = ""
 
-    def taken(self, value: Any) -> Any:
-        """Return today's value of that of 2015, whose modes were found by their parts."""
-        return _MODES[self.owner](value) if self.key == "mode" and self.owner in _MODES else value
+    def taken(self, value: Any) -> Dict[str, Any]:
+        """Return names and value of today's parameters; none where there are none."""
+        now = _mode(self.owner, value) if self.key == "mode" and isinstance(value, str) else value
+        return {name: now for name in (self.here, self.also) if name}
 
 
-def _scan_mode(value: str) -> str:
-    return ("LASER" if "LASER" in value else "SONAR") + ("CONT" if "CONT" in value else "")
+def _mode(owner: str, value: str) -> str:
+    """Return today's mode of that of 2015, which was found by its parts."""
+    if owner == "SonarToCloud":
+        return ("LASER" if "LASER" in value else "SONAR") + ("CONT" if "CONT" in value else "")
+    if owner == "Thresholder":
+        parts = [part for part in ("OTSU", "FIXED", "PROPORTIONAL") if part in value]
+        return "OTSU+PROPORTIONAL" if parts == ["OTSU", "PROPORTIONAL"] else parts[0] if parts else value
+    if owner == "OutlierRemover":
+        return "STATISTICAL" if "STATISTICAL" in value else "RADIUS"
+    return value
 
 
-def _threshold_mode(value: str) -> str:
-    parts = [part for part in ("OTSU", "FIXED", "PROPORTIONAL") if part in value]
-    return "OTSU+PROPORTIONAL" if parts == ["OTSU", "PROPORTIONAL"] else parts[0] if parts else value
-
-
-def _outlier_mode(value: str) -> str:
-    return "STATISTICAL" if "STATISTICAL" in value else "RADIUS"
-
-
-_MODES = {"SonarToCloud": _scan_mode, "Thresholder": _threshold_mode, "OutlierRemover": _outlier_mode}
 TABLE = yaml.safe_load((package_folder() / "migration/names_2015.yaml").read_text(encoding="utf-8"))
 _BEAMS = "sonarSubscribeTopic"
 _BY_OWNER: Dict[str, Dict[str, Key]] = {
@@ -114,26 +113,19 @@ def migrated_text(given: Mapping[str, Mapping[str, Any]]) -> str:
     for owner, values in given.items():
         keys = _BY_OWNER[owner]
         node = next(iter(keys.values())).node
-        taken = dict(pair for key, value in values.items() for pair in _taken(keys[key], value))
+        taken = {name: now for key, value in values.items() for name, now in keys[key].taken(value).items()}
         try:
             nested = NODES[node].nested(NODES[node].by_name(taken)[0])
             NODES[node].from_mapping(nested)
         except ParameterError as error:
             raise ParameterError(f"{owner}: {error}") from error
         lines += ["", f"# {owner}", f"{node}:" if taken else f"{node}: {{}}"]
-        lines += [
-            f"  # {_line(key, value)} ({keys[key].remark})" for key, value in values.items() if not keys[key].here
-        ]
+        kept = {key: value for key, value in values.items() if not keys[key].here}
+        lines += [f"  # {_line(key, value)} ({keys[key].remark})" for key, value in kept.items()]
         lines += _indented({key: value for key, value in nested.items() if key != EXPERT}, "  ")
         if EXPERT in nested:
             lines += [f"  {EXPERT}:", *_indented(nested[EXPERT], "    ")]
     return "\n".join(lines) + "\n"
-
-
-def _taken(key: Key, value: Any) -> List[Tuple[str, Any]]:
-    """Return names and value of today's parameters; none where there are none."""
-    now = key.taken(value) if isinstance(value, str) else value
-    return [(name, now) for name in (key.here, key.also) if name]
 
 
 def _indented(values: Mapping[str, Any], indent: str) -> List[str]:
@@ -150,21 +142,18 @@ def _by_owner(file: Path) -> Dict[str, Dict[str, Any]]:
     Raises ParameterError for a key that no node of 2015 had.
     """
     values = read_values(file)
-    if values and all(isinstance(value, Mapping) for value in values.values()):
-        parts = [(name, dict(part)) for name, part in values.items()]
-    else:
-        parts = [(file.stem, values)]
-    return dict(_owned(file, name, part) for name, part in parts)
-
-
-def _owned(file: Path, name: str, values: Dict[str, Any]) -> Tuple[str, Dict[str, Any]]:
-    owner = _owner(name, values)
-    if owner is None:
-        raise ParameterError(f"{file}: {name}: must be named as one of {', '.join(_BY_OWNER)}")
-    unknown = [key for key in values if key not in _BY_OWNER[owner]]
-    if unknown:
-        raise ParameterError(f"{file}: {unknown[0]}: no parameter of {owner} in 2015")
-    return owner, values
+    if not (values and all(isinstance(value, Mapping) for value in values.values())):
+        values = {file.stem: values}
+    found = {}
+    for name, part in values.items():
+        owner = _owner(name, part)
+        if owner is None:
+            raise ParameterError(f"{file}: {name}: must be named as one of {', '.join(_BY_OWNER)}")
+        unknown = [key for key in part if key not in _BY_OWNER[owner]]
+        if unknown:
+            raise ParameterError(f"{file}: {unknown[0]}: no parameter of {owner} in 2015")
+        found[owner] = dict(part)
+    return found
 
 
 def _owner(name: str, values: Mapping[str, Any]) -> Optional[str]:

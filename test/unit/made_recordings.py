@@ -1,9 +1,11 @@
 """A small recording: a vehicle tours an angular basin, without a simulator."""
 
-from typing import Callable, List, Optional, Tuple
+from typing import Callable, List, Optional, Sequence, Tuple
 
 import numpy as np
 
+from mlsm_manager.localisation.following import Following
+from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.offline.recording import Recording, scans_of
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.geometry import matrices
@@ -37,6 +39,17 @@ def strafing() -> Recording:
 def scans_in(recording: Recording, parameters: Optional[EchoExtractorParameters] = None) -> List[Scan]:
     """Return the scans of echoes that a recording holds."""
     return [scan for scan, _ in scans_of(recording, EchoExtractor(parameters or EchoExtractorParameters()))]
+
+
+def looked_at(
+    recording: Recording, scans: Sequence[Scan], parameters: Optional[LocaliserParameters] = None
+) -> Following:  # fmt: skip
+    """Return what is known of a vehicle while it goes on, once scans of it were taken and looked at for causes."""
+    localiser = (parameters or LocaliserParameters()).build_localiser(recording.sonar_in_base)
+    for scan in scans:
+        localiser.take_scan(scan)
+    localiser.look_for_causes()
+    return localiser.following
 
 
 def trembling(recording: Recording) -> np.ndarray:

@@ -6,15 +6,24 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, replace
 from itertools import cycle
 from multiprocessing import cpu_count, get_context
-from typing import List, Optional, Sequence
+from pathlib import Path
+from typing import Dict, List, Optional, Sequence, Tuple
+
+import numpy as np
 
 from georeferencing.adjustment import Adjusted
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.findings import Findings
-from mlsm_manager.offline.heard_scans import Heard, heard_in, progress_bar
-from mlsm_manager.offline.mended_recording import with_odometry_mended, with_steady_head, with_turning_head
+from mlsm_manager.offline.heard_scans import (
+    Heard,
+    heard_in,
+    progress_bar,
+    with_odometry_mended,
+    with_steady_head,
+    with_turning_head,
+)
 from mlsm_manager.offline.odometry_choice import (
     are_moves_turned,
     believed_runs,
@@ -23,27 +32,60 @@ from mlsm_manager.offline.odometry_choice import (
     odometry_in,
     positions_mislead,
 )
-from mlsm_manager.offline.recording import Recording
+from mlsm_manager.offline.recording import Recording, read_recording, scans_of, whole_turns
 from mlsm_manager.offline.refinement import REFITS, Refined, parts_of_refining, refine, refitted_verdicts
-from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
+from mlsm_manager.offline.replay import CORRECTED, Replayed, ReplayParameters, replay
 from mlsm_manager.offline.run_files import FURTHER_COLORS, REFINED, Run
-from mlsm_manager.offline.sessions import Session, prepared
 from mlsm_manager.offline.suited_parameters import OdometryFound, with_cells
 from mlsm_manager.offline.trust import Trust
+from mlsm_manager.report.mission import Path as Trajectory
+from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes, ranges_are_told
 from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault, Suspicion
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD
 from mlsm_manager.self_check.echo_causes import echo_findings, put_right
-from mlsm_manager.self_check.lengths import assumed_of_lengths
+from mlsm_manager.self_check.motion_findings import assumed_of_lengths
 from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.surface_map.map_file import StoredMap
 from recordings.bags.bag import RecordingError
+from recordings.reader import Request
 from sonar_processing.beams.parameters import BeamCorrection
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _YAW_AS_TOLD = "the sonar's yaw in tf is right, which a vehicle that strafes with a compass alone does not show"
 _MAP_FRAME = "map"  # the frame that live.yaml's nodes call their map by default
+_SHOWN_AFTER = 3.0  # s after a scan ends: its correction waits for odometry and is blended in
+
+
+@dataclass(frozen=True)
+class Session:
+    """bag: its file. replayed: what came of it in the map of those before, in which the vehicle is searched first."""
+
+    bag: Path
+    replayed: Replayed
+
+    def to_mapping(self) -> Dict[str, object]:
+        return {
+            "bag": self.bag.name,
+            "scans": len(self.replayed.updates),
+            "matched": self.replayed.matched,
+            "rejected": self.replayed.rejected,
+            "found_after_scans": self.scans_until_found,
+        }
+
+    def trajectory(self, color: str) -> Trajectory:
+        """Return the vehicle's path since the first scan was found in the map; empty where none was."""
+        found, replayed = self.scans_until_found, self.replayed
+        start = np.inf if found is None else replayed.updates[found].scan.reference_time + _SHOWN_AFTER
+        known = replayed.times >= start
+        return Trajectory(f"{CORRECTED}, {self.bag.name}", color, replayed.times[known], replayed.corrected[known])
+
+    @property
+    def scans_until_found(self) -> Optional[int]:
+        """Number of scans before the first that was found; None where none was, and nothing was added to the map."""
+        accepted = [index for index, update in enumerate(self.replayed.updates) if update.accepted]
+        return accepted[0] if accepted else None
 
 
 @dataclass(frozen=True)
@@ -69,7 +111,7 @@ class MappedBag:
     def solution(self) -> Optional[Solution]:
         """The run as the joint solver knows it best; None where it did not follow it."""
         if self.refined is not None:
-            return self.refined.solution
+            return self.refined.motion.run
         return None if self.replayed.solver is None else self.replayed.solver.solution
 
 
@@ -137,7 +179,7 @@ def _judged(
     further = [heard.signs.turns()]
     if options.check:
         with progress_bar(REFITS, "fit", "check") as bar:
-            further += refitted_verdicts(refined.solution, refined.batch, bar.update)
+            further += refitted_verdicts(refined.motion.run, refined.motion.fit, bar.update)
     if replayed.rivals is not None and replayed.rivals.told:
         odometry = odometry._replace(reason=f"{odometry.reason}; by the echoes {replayed.rivals.told}")
     findings, known = None, parameters
@@ -183,13 +225,20 @@ def _further_sessions(first: Replayed, parameters: ReplayParameters, options: Na
     # No fork: this process may have threads that hold locks.
     with ProcessPoolExecutor(min(len(bags), cpu_count()), get_context("spawn")) as executor:
         request = replace(options.request, truth=None)
-        waiting = [executor.submit(prepared, bag, request, parameters) for bag in bags]
+        waiting = [executor.submit(_prepared, bag, request, parameters) for bag in bags]
         for bag, job in zip(bags, waiting):
             recording, scans = job.result()
             with progress_bar(len(scans), "scan", bag.name[:9]) as bar:
                 sessions.append(Session(bag, replay(recording, scans, parameters, bar.update, known)))
             known = _stored(sessions[-1].replayed, parameters)
     return sessions
+
+
+def _prepared(bag: Path, request: Request, parameters: ReplayParameters) -> Tuple[Recording, List[Scan]]:
+    """Return the corrected recording and its scans. Raises RecordingError and OSError."""
+    recording = read_recording(bag, request).corrected(parameters.part(BeamCorrection))
+    scans = scans_of(recording, EchoExtractor(parameters.echoes()))
+    return recording, whole_turns(bag, len(recording.beams), scans)
 
 
 def _stored(replayed: Replayed, parameters: ReplayParameters) -> StoredMap:
@@ -204,15 +253,17 @@ def _run(
 ) -> Run:  # fmt: skip
     poses = replayed.poses
     stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
-    counts = {
-        "scans": len(replayed.scans),
-        "matched": replayed.matched,
-        "rejected": replayed.rejected,
-        "left_out": dict(replayed.refused),
-    }
+    counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
     if refined is not None:
         poses[REFINED] = refined.poses
         stored = replace(stored, layers=refined.layers)
     paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
     further = [path for path in paths if len(path.times)]
-    return Run(replayed.times, poses, {**counts, "blocks": len(stored.shown)}, stored, trust, further)
+    return Run(
+        replayed.times,
+        poses,
+        {**counts, "left_out": dict(replayed.refused), "blocks": len(stored.shown)},
+        stored,
+        trust,
+        further,
+    )

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Tuple
@@ -22,10 +23,8 @@ from recordings.bags.bag import RecordingError
 from recordings.bags.ros2_folder import METADATA, STORAGES
 from recordings.makers_logs import is_makers_log
 
-TIMEOUT = 10.0
-"""s: a cluster in the same network answers within a second, a busy one within a few."""
-PATIENCE = 30.0
-"""s without any worker after which none is expected to come back: a worker that is started anew needs a few."""
+TIMEOUT = 10.0  # s: a cluster in the same network answers within a second, a busy one within a few
+PATIENCE = 30.0  # s without any worker after which none is expected to come back: one started anew needs a few
 _WORKER = "python3 -m distributed.cli.dask_worker ADDRESS"
 _LOGS = ("distributed.client", "distributed.utils", "asyncio")
 
@@ -91,21 +90,18 @@ class Cluster:
                 f"--scheduler {self._address}: a worker cannot run map_bag: {error}; start workers with the "
                 f"Python that runs it here: {_WORKER}"
             ) from None
+        here, _ = _look(folder)
         for worker, (versions, is_there) in found.items():
-            if versions != _versions():
-                raise RecordingError(f"--scheduler {self._address}: {worker} has {versions}, here are {_versions()}")
+            if versions != here:
+                raise RecordingError(f"--scheduler {self._address}: {worker} has {versions}, here are {here}")
             if not is_there:
                 raise RecordingError(f"--scheduler {self._address}: {worker} does not see {folder}")
 
 
-def _versions() -> Dict[str, str]:
-    """Return the versions on which the bytes of a map depend."""
-    return {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
-
-
 def _look(folder: Path) -> Tuple[Dict[str, str], bool]:
-    """Return what a worker has, and whether it sees a folder."""
-    return _versions(), folder.is_dir()
+    """Return the versions on which the bytes of a map depend, and whether a folder is seen."""
+    versions = {"python": platform.python_version(), "numpy": np.__version__, "scipy": scipy.__version__}
+    return versions, folder.is_dir()
 
 
 INDEX = "index.html"
@@ -185,11 +181,10 @@ def map_each(
 
 def _jobs(recordings: Sequence[Path], out: Path) -> List[Job]:
     """Return a job for each recording; of equal names the second and further ones get a number."""
-    taken: Dict[str, int] = {}
-    jobs = []
+    taken, jobs = Counter(), []
     for recording in recordings:
         name = recording.stem
-        taken[name] = taken.get(name, 0) + 1
+        taken[name] += 1
         jobs.append(Job(recording.absolute(), out.absolute() / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
     return jobs
 

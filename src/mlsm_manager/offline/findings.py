@@ -57,26 +57,18 @@ class Calibration:
         return cls((*_OF_RUN, *odometry.calibrated), values, np.maximum(deviations, HELD_DEVIATION))
 
     @classmethod
-    def found(cls, solver: LiveSolver, known: Union[LiveEstimate, PartResult]) -> "Calibration":
-        """Return what an estimate during a run, or the fit of a part of it, knows."""
-        variances = np.diag(known.covariance)
-        return cls._of(solver, known.run, known.node, variances[-RUN_COLUMNS:], variances)
-
-    @classmethod
-    def of_batch(cls, solver: LiveSolver, batch: BatchResult) -> "Calibration":
-        """Return what the fit of a whole run found; scale and direction are those of the last node."""
-        of_run, of_node = np.diag(batch.run_covariance), np.diag(solver.estimates[-1].covariance)
-        return cls._of(solver, batch.state.run, batch.state.nodes[-1], of_run, of_node)
-
-    @classmethod
-    def _of(
-        cls, solver: LiveSolver, run: np.ndarray, node: np.ndarray, of_run: np.ndarray, of_node: np.ndarray
+    def found(
+        cls, solver: LiveSolver, known: Union[LiveEstimate, PartResult], batch: Optional[BatchResult] = None
     ) -> "Calibration":
-        """Return that of the unknowns of run (2,) and node, with their variances.
+        """Return what an estimate during a run, or the fit of a part of it, knows, or the fit of the whole run found.
 
-        A range scale that the run could not tell is as uncertain as before.
+        batch: that fit; scale and direction are those of the last node, whose variances `known`, the last estimate,
+        tells. A range scale that the run could not tell is as uncertain as before.
         """
-        calibrated = solver.odometry.calibrated
+        of_node, calibrated = np.diag(known.covariance), solver.odometry.calibrated
+        run, node, of_run = known.run, known.node, of_node[-RUN_COLUMNS:]
+        if batch is not None:
+            run, node, of_run = batch.state.run, batch.state.nodes[-1], np.diag(batch.run_covariance)
         columns = list(calibrated.values())
         deviations = np.sqrt(np.append(of_run, of_node[columns]))
         deviations[0] = np.hypot(deviations[0], solver.parameters.world_scale_deviation(solver.log))
@@ -176,14 +168,14 @@ def _known_live(solver: LiveSolver) -> KnownPlaces:
 
 def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
     solver, strafing = replayed.solver, replayed.strafing
-    known = _known_by(refined.batch, refined.solution)
+    known = _known_by(refined.motion.fit, refined.motion.run)
     lengths = np.full(len(known.times), solver.estimates[-1].length_deviation)
     directions = float(np.hypot(solver.heading_deviation, refined.motion.mounts))
     expected = expected_deviations(known.places - known.places[0], lengths, directions)
     known = known._replace(covariances=known.covariances + refined.motion.spread(known.times))
     # One fit takes a second, a search for the best path minutes. On unbroken tours both state the same within 2 %.
     known = known if strafing is None else known.or_on(_known_by(fit_of(strafing.solution), strafing.solution))
-    return _BestPath(refined.poses, refined.solution, *known, expected, refined.motion.mounts)
+    return _BestPath(refined.poses, refined.motion.run, *known, expected, refined.motion.mounts)
 
 
 def _known_by(fit: BatchResult, run: Solution) -> KnownPlaces:
@@ -197,8 +189,16 @@ def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> Li
     turns = Turns.of(solver.estimates, apart, parts)
     heard = Turns.with_echoes(solver.estimates, apart, parts, solver.log.surfaces.counts, solver.log.scan_count)
     start, before = float(solver.log.node_times[0]), Calibration.expected(solver)
+    if np.isinf(solver.odometry.distance_deviation):
+        # The odometry reports no distances: scans are compared with those before them instead.
+        motion = (scans_go_on(turns.times, shares_heard_before(best.solution, 0)),)
+    else:
+        motion = against_odometry(
+            replayed.times, replayed.odometry, best.poses,
+            scale_deviation=solver.odometry.distance_deviation, position_walk=solver.odometry.position_walk,
+        )  # fmt: skip
     return [
-        *_against_odometry_or_before(replayed, best.poses, best.solution, turns.times),
+        *motion,
         recent_agreement(heard.times, heard.agreements),
         position_uncertainty(best.times, radii(best.covariances), best.expected),
         *surfaces_tell(start, turns.times, turns.surfaces, solver.distance_deviation),
@@ -221,22 +221,6 @@ def _trust(
     is_alone = np.isinf(replayed.solver.odometry.distance_deviation) and np.ptp(replayed.odometry[:, 2]) > 0.0
     untold = UNTOLD_ALONE if is_alone else ""
     return Trust(verdicts, best.times, covariances, replayed.matched, causes, untold=untold).assuming(assumed, ways)
-
-
-def _against_odometry_or_before(
-    replayed: Replayed, path: np.ndarray, solution: Solution, ends: np.ndarray
-) -> Tuple[Verdict, ...]:
-    """Compare a path (m, 3) with the odometry's, or, where that reports no distances, scans with those before them.
-
-    ends: (n,) s of the turns.
-    """
-    solver = replayed.solver
-    if np.isinf(solver.odometry.distance_deviation):
-        return (scans_go_on(ends, shares_heard_before(solution, 0)),)
-    return against_odometry(
-        replayed.times, replayed.odometry, path,
-        scale_deviation=solver.odometry.distance_deviation, position_walk=solver.odometry.position_walk,
-    )  # fmt: skip
 
 
 def _halves(solver: LiveSolver) -> Tuple[Verdict, ...]:
@@ -272,21 +256,16 @@ class Findings:
         rests on, if anything.
         """
         solver = replayed.solver
-        if refined is None:
-            calibration, best, closing = Calibration.found(solver, solver.estimates[-1]), _live_path(replayed), None
-        else:
-            calibration, best = Calibration.of_batch(solver, refined.batch), _refined_path(refined, replayed)
-            closing = refined.closing
+        batch = None if refined is None else refined.motion.fit
+        calibration = Calibration.found(solver, solver.estimates[-1], batch)
+        best = _live_path(replayed) if refined is None else _refined_path(refined, replayed)
         best = best.to_the_end(replayed.at_end, solver.estimates[-1].pose_covariance[POSITION, POSITION])
         verdicts = [*_checks(replayed, best, calibration), *further]
         causes = ranked([*causes, *best.causes_of_silence(replayed.silences, replayed.at_end)])
-        return cls(calibration, _trust(replayed, best, verdicts, causes, assumed), closing)
+        trust = _trust(replayed, best, verdicts, causes, assumed)
+        return cls(calibration, trust, None if refined is None else refined.closing)
 
     def to_mapping(self) -> Dict[str, Any]:
         loops = {} if self.closing is None else {"loops": self.closing.to_mapping()}
-        return {
-            "calibration": self.calibration.to_mapping(),
-            **self.trust.to_mapping(),
-            **loops,
-            "trust": self.trust.line,
-        }
+        calibration = self.calibration.to_mapping()
+        return {"calibration": calibration, **self.trust.to_mapping(), **loops, "trust": self.trust.line}

@@ -1,24 +1,57 @@
-"""The scans of a recording, with the sonar where tf says that it is mounted, or where echoes tell that it is."""
+"""The scans of a recording, without what its beams or odometry show to be wrong, and as its sonar is mounted."""
 
 import sys
 from argparse import Namespace
 from dataclasses import replace
-from typing import List, NamedTuple
+from typing import List, NamedTuple, Tuple
 
 import numpy as np
 from tqdm import tqdm
 
 from mlsm_manager.localisation.odometry_profiles import COMPASS_ONLY, OdometryKind
 from mlsm_manager.odometry.changed_tracks import Mirror
+from mlsm_manager.odometry.mending import mended
+from mlsm_manager.odometry.steps import MotionLimits
 from mlsm_manager.offline.recording import Recording, scans_of, whole_turns
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.self_check.causes import CERTAIN, Cause
+from mlsm_manager.self_check.beam_causes import head_stood, of_standing, of_trembling
+from mlsm_manager.self_check.causes import CERTAIN, Cause, of_steps, of_stuck
 from mlsm_manager.self_check.echo_causes import TURN_DEVIATION, EchoFindings, echo_findings, turn_text
 from mlsm_manager.self_check.north_east_down import ZDownSigns, z_down_signs
 from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis
+from sonar_processing.beams.steady_head import steadied
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
 _OVER = Cause(turn_text(Hypothesis(is_over=True)), CERTAIN, turn=np.pi)  # if it is the odometry, the path is mirrored
+_MOSTLY = 0.9  # share of the beams whose angles are mended: then those of the head are
+
+
+def with_steady_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
+    """Return a recording whose head's angles do not tremble, and what was wrong with it."""
+    found = steadied(recording.sent)
+    if found is None:
+        return recording, []
+    beams = [replace(placed, beam=beam) for placed, beam in zip(recording.beams, found.beams)]
+    return replace(recording, beams=beams), [of_trembling(np.degrees(found.deviation), found.share > _MOSTLY)]
+
+
+def with_turning_head(recording: Recording) -> Tuple[Recording, List[Cause]]:
+    """Return a recording without what a head that stood heard, and what was wrong with it."""
+    stood, _ = head_stood(recording.sent)
+    for one in stood:
+        recording = recording.without_beams(one.begin, one.end)
+    return recording, of_standing(stood)
+
+
+def with_odometry_mended(recording: Recording, limits: MotionLimits) -> Tuple[Recording, List[Cause]]:
+    """Return a recording whose odometry goes where a vehicle can have gone, and what was wrong with it."""
+    track, steps, stuck, untold = mended(recording.track, limits)
+    causes = [*of_steps(steps), *(of_stuck(*one) for one in stuck)]
+    if not causes:
+        return recording, []
+    for begin, end in untold:
+        recording = recording.without_beams(begin, end)
+    return recording.with_track(track), causes
 
 
 class Heard(NamedTuple):
@@ -64,9 +97,11 @@ def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -
 
 def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:
     advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
-    advice += "; if the head turns the other way, set head_turns"
     for sign in signs.lines():
-        print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
+        print(
+            f"map_bag: {options.bags[0]}: {sign}; {advice}; if the head turns the other way, set head_turns",
+            file=sys.stderr,
+        )
 
 
 def progress_bar(total: int, unit: str, name: str) -> tqdm:

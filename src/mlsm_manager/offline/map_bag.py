@@ -10,7 +10,7 @@ from typing import Any, Dict, List
 from georeferencing.asked import AskedOrigin
 from mlsm_manager.localisation.odometry_profiles import OdometryKind
 from mlsm_manager.localisation.parameters import EstimatorName
-from mlsm_manager.offline.bag_mapping import MappedBag, mapped_bag
+from mlsm_manager.offline.bag_mapping import mapped_bag
 from mlsm_manager.offline.charts import with_origin, write_charts
 from mlsm_manager.offline.each import INDEX, map_each, options_of_one, recordings_in
 from mlsm_manager.offline.mcap_file import write_mcap
@@ -69,7 +69,12 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
     mapped = with_origin(mapped_bag(recording, options), options)
     errors = errors_of(mapped.run, mapped.recording)
     with whole_folder(options.out, options.read) as folder:
-        _write_results(folder, mapped, options)
+        write_run(folder, mapped.title, mapped.run, mapped.recording)
+        for number, session in enumerate(mapped.sessions, start=2):
+            write_trajectory(folder / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
+        write_charts(folder, mapped)
+        live = live_text(mapped.parameters, options.odom_frame, options.base_frame, options.chain)
+        write_whole(folder / "live.yaml", live.encode())
         summary = summary_of(mapped, errors, time.monotonic() - start)
         write_summary(folder, summary)
         mission = mission_of(mapped, errors)
@@ -77,15 +82,6 @@ def map_bag(options: Namespace) -> Dict[str, Any]:
             write_mcap(folder / MCAP, mission, folder / PICTURE)
         _write_report(folder, mission)
     return summary
-
-
-def _write_results(folder: Path, mapped: MappedBag, options: Namespace) -> None:
-    write_run(folder, mapped.title, mapped.run, mapped.recording)
-    for number, session in enumerate(mapped.sessions, start=2):
-        write_trajectory(folder / f"trajectory_{number}.csv", session.replayed.times, session.replayed.poses)
-    write_charts(folder, mapped)
-    live = live_text(mapped.parameters, options.odom_frame, options.base_frame, options.chain)
-    write_whole(folder / "live.yaml", live.encode())
 
 
 def _write_report(folder: Path, mission: Mission) -> None:

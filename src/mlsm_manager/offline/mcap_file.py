@@ -32,11 +32,16 @@ def write_mcap(file: File, mission: Mission, picture: File) -> None:
         bag.write("/map/blocks", _cloud(bag, start, blocks.mean), start)
         if len(blocks):
             bag.write("/map/grid", _grid(bag, start, mission), start)
-        bag.write("/map/picture", _picture(bag, start, picture), start)
+        shown = bag.stamped("sensor_msgs/CompressedImage", bag.time(start), _MAP)
+        shown.format, shown.data = "png", np.frombuffer(picture.read_bytes(), dtype=np.uint8)
+        bag.write("/map/picture", shown, start)
         for path in (*mission.paths, *mission.further):
             bag.write(f"/path/{path.name.replace(' ', '_').replace(',', '')}", _path(bag, start, path), start)
         bag.write("/checks", _checks(bag, start, mission), start)
-        stamped = [*_poses(bag, mission), *_scans(bag, mission)]
+        stamped = _poses(bag, mission)
+        for scan in mission.scans:
+            stamp, flat = round(scan.time * 1e9), np.pad(scan.points, ((0, 0), (0, 2)), mode="constant")
+            stamped.append((stamp, "/scan", _cloud(bag, stamp, flat)))
         for stamp_ns, topic, message in sorted(stamped, key=lambda one: one[0]):
             bag.write(topic, message, stamp_ns)
 
@@ -62,12 +67,6 @@ def _grid(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
     message.info.origin.position.x, message.info.origin.position.y = map(float, raster.origin)
     message.info.origin.orientation.w = 1.0
     message.data = raster.values.ravel()
-    return message
-
-
-def _picture(bag: McapWriter, stamp_ns: int, picture: File) -> Any:
-    message = bag.stamped("sensor_msgs/CompressedImage", bag.time(stamp_ns), _MAP)
-    message.format, message.data = "png", np.frombuffer(picture.read_bytes(), dtype=np.uint8)
     return message
 
 
@@ -124,14 +123,6 @@ def _doubts(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
         answer = Answer.DOUBTFUL if is_doubtful else elsewhere
         message.status.append(_status(bag, verdict.name, _LEVELS[answer], answer.value))
     return message
-
-
-def _scans(bag: McapWriter, mission: Mission) -> List[Any]:
-    found = []
-    for scan in mission.scans:
-        stamp, flat = round(scan.time * 1e9), np.pad(scan.points, ((0, 0), (0, 2)), mode="constant")
-        found.append((stamp, "/scan", _cloud(bag, stamp, flat)))
-    return found
 
 
 def _placing(pose: np.ndarray) -> Placing:

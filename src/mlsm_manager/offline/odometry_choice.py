@@ -12,20 +12,14 @@ from mlsm_manager.offline.heard_scans import heard_in, progress_bar
 from mlsm_manager.offline.recording import Recording
 from mlsm_manager.offline.refinement import Refined
 from mlsm_manager.offline.replay import Replayed, ReplayParameters, replay
-from mlsm_manager.offline.suited_parameters import (
-    OdometryFound,
-    goes_astray,
-    goes_on_better,
-    may_strafe,
-    odometry_of,
-    with_odometry,
-)
+from mlsm_manager.offline.suited_parameters import OdometryFound, goes_on, goes_on_better, odometry_of, with_odometry
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import ranges_are_told
 from mlsm_manager.self_check.course import moves_are_turned
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.fault_trials import with_other_ranges
 from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis
+from mlsm_manager.self_check.verdict import Answer
 from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.filters.echo_extractor import EchoExtractor
 
@@ -53,7 +47,7 @@ def followed(
     parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
     replayed = _replayed(recording, scans, parameters)
     asked = odometry.kind is OdometryKind.HEADING and not is_named(options) and replayed.solver is not None
-    if not asked or not may_strafe(replayed.solver.solution):
+    if not asked or goes_on(replayed.solver.solution) is Answer.FINE:
         return odometry, parameters, replayed
     other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
     changed = with_odometry(extracting, other.kind, options.fixed)
@@ -77,24 +71,17 @@ def positions_mislead(
     must go on badly with that mount, too.
     """
     asked = odometry.kind is OdometryKind.AUTO and not is_named(options) and len(believed) > 0 and not mount.is_over
-    if not asked or not all(map(goes_astray, believed)):
+    if not asked or any(goes_on(run) is not Answer.DOUBTFUL for run in believed):
         return False
     if mount != AS_TOLD:
-        believed = [_as_mounted(recording, extracting, odometry, options)]
-        if not goes_astray(believed[0]):
+        fixing = Namespace(**{**vars(options), "fix_mount": True})
+        heard = heard_in(recording, odometry.kind, EchoExtractor(extracting.echoes()), fixing)
+        parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
+        believed = [_replayed(heard.recording, heard.scans, parameters).solver.solution]
+        if goes_on(believed[0]) is not Answer.DOUBTFUL:
             return False
     alone = _replayed(recording, scans, with_odometry(extracting, OdometryKind.HEADING, options.fixed))
     return goes_on_better(believed[-1], alone.solver.solution)
-
-
-def _as_mounted(
-    recording: Recording, extracting: ReplayParameters, odometry: OdometryFound, options: Namespace
-) -> Solution:  # fmt: skip
-    """Return the live run of a recording whose mount is put right as the echoes tell it."""
-    asked = Namespace(**{**vars(options), "fix_mount": True})
-    heard = heard_in(recording, odometry.kind, EchoExtractor(extracting.echoes()), asked)
-    parameters = with_odometry(extracting, odometry.kind, options.fixed, odometry.motion, odometry.is_said)
-    return _replayed(heard.recording, heard.scans, parameters).solver.solution
 
 
 def are_moves_turned(recording: Recording, mount: Hypothesis, options: Namespace) -> bool:
@@ -112,7 +99,7 @@ def believed_runs(replayed: Replayed, refined: Optional[Refined]) -> List[Soluti
     """
     runs = [] if replayed.solver is None else [replayed.solver.solution]
     if refined is not None and not any(isinstance(cause.fault, SonarFault) for cause in refined.motion.causes):
-        runs.append(refined.solution)
+        runs.append(refined.motion.run)
     return runs
 
 

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from georeferencing.origin import Origin
-from mlsm_manager.report.compass_rose import north, north_label, scale_bar
+from mlsm_manager.report.compass_rose import north, scale_bar
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.report.mission import Uncertainty
 from mlsm_manager.surface_map.blocks import Blocks
@@ -101,8 +101,8 @@ def _draw_scale(axes: Axes, origin: Optional[Origin]) -> None:
     axes.annotate(f"{bar:g} m", above, (0, 5), textcoords="offset points", ha="center", color=_INK)
     arrow = {"arrowstyle": "-|>", "color": _INK, "linewidth": 2.0}
     axes.annotate(
-        north_label(origin), (0.95, 0.9), -38.0 * north(origin), xycoords="axes fraction", textcoords="offset points",
-        arrowprops=arrow, ha="center", va="center", color=_INK, zorder=7,
+        "N?" if origin is None else "N", (0.95, 0.9), -38.0 * north(origin), xycoords="axes fraction", ha="center",
+        textcoords="offset points", arrowprops=arrow, va="center", color=_INK, zorder=7,
     )  # fmt: skip
 
 

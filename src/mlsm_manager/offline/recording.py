@@ -77,9 +77,8 @@ class Recording:
     def _moved(self, moves: np.ndarray) -> "Recording":
         """Return the recording with its beams moved in odom, each by one of `moves` (n, 4, 4)."""
         pairs = zip(self.beams, moves)
-        return replace(
-            self, beams=[replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in pairs]
-        )
+        beams = [replace(placed, T_target_sonar=move @ placed.T_target_sonar) for placed, move in pairs]
+        return replace(self, beams=beams)
 
     def without_beams(self, begin: float, end: float) -> "Recording":
         """Return the recording without the beams between two times [s]; they count as unplaced."""
@@ -126,14 +125,14 @@ class Recording:
 
 def scans_of(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Scan, int]]:
     """Yield one scan of echoes per turn or sweep of the head, with its number of beams; see clouds_with_odometry."""
-    return clouds_with_odometry(recording, _echoes(recording, extractor))
 
+    def echoes() -> Iterator[Tuple[Cloud, int]]:
+        cloud = SonarToCloudParameters()
+        for turn in turns_of(recording.beams, FEWEST_BEAMS):
+            with suppress(RefusedInput):
+                yield extractor(PolarScan.of(turn).cloud(cloud)), len(turn)
 
-def _echoes(recording: Recording, extractor: EchoExtractor) -> Iterator[Tuple[Cloud, int]]:
-    cloud = SonarToCloudParameters()
-    for turn in turns_of(recording.beams, FEWEST_BEAMS):
-        with suppress(RefusedInput):
-            yield extractor(PolarScan.of(turn).cloud(cloud)), len(turn)
+    return clouds_with_odometry(recording, echoes())
 
 
 def clouds_with_odometry(recording: Recording, clouds: Iterable[Tuple[Cloud, int]]) -> Iterator[Tuple[Scan, int]]:

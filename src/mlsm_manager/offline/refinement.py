@@ -38,19 +38,9 @@ class Refined:
     closing: LoopClosure
     motion: MotionFindings
 
-    @property
-    def batch(self) -> BatchResult:
-        return self.motion.fit
 
-    @property
-    def solution(self) -> Solution:
-        return self.motion.run
-
-
-Done = Callable[[], object]
-"""Called after each part of a long work."""
-REFITS = 5
-"""Parts of `refitted_verdicts`."""
+Done = Callable[[], object]  # called after each part of a long work
+REFITS = 5  # parts of `refitted_verdicts`
 
 
 def parts_of_refining(rivals: RivalSolvers) -> int:

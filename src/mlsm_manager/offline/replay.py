@@ -73,13 +73,12 @@ def live_values(
     chain: what made the scans, where they are not echoes.
     """
     values = {name: _common(parameters.to_mapping(), name) for name in NODES}
-    cloud = SonarToCloudParameters(target_frame=odom_frame)
-    values["sonar_to_cloud"].update(
-        target_frame=cloud.target_frame, min_range=cloud.min_range, height_limit=cloud.height_limit
-    )
-    if chain is not None:
-        values["sonar_to_cloud"] = {**chain.clouds.to_mapping(), **_common(parameters.to_mapping(), "sonar_to_cloud")}
-        values["sonar_to_cloud"].update(target_frame=odom_frame)
+    if chain is None:
+        cloud = SonarToCloudParameters()
+        own = {"min_range": cloud.min_range, "height_limit": cloud.height_limit}
+        values["sonar_to_cloud"].update(target_frame=odom_frame, **own)
+    else:
+        values["sonar_to_cloud"] = {**chain.clouds.to_mapping(), **values["sonar_to_cloud"], "target_frame": odom_frame}
     values["mlsm_core"].update(
         size_x_meters=0.0,
         size_y_meters=0.0,
@@ -221,9 +220,8 @@ def replay(
     corrections, updates, refused, seconds = np.empty((len(track.times), 3)), [], Counter(), []
     done = 0
     for scan in scans:
-        known = max(
-            done, int(np.searchsorted(track.times, scan.reference_time + localiser.estimator.lookahead, side="left"))
-        )
+        needed = scan.reference_time + localiser.estimator.lookahead
+        known = max(done, int(np.searchsorted(track.times, needed, side="left")))
         corrections[done:known] = _corrections(localiser, track, done, known)
         done, start = known, process_time()
         try:

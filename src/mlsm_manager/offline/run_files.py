@@ -23,10 +23,8 @@ REFINED = "refined"
 REPORT = "report.html"
 PICTURE = "map.png"
 MCAP = "map.mcap"
-LABELS = {ODOMETRY: "dead reckoning", CORRECTED: "corrected", REFINED: "refined"}
-COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833"}
+_COLORS = {ODOMETRY: "#999999", CORRECTED: "#1f5fa8", REFINED: "#118833", "truth": "#111111"}
 _COLUMNS = {ODOMETRY: "odometry", CORRECTED: "corrected", REFINED: "refined"}
-TRUTH_COLOR = "#111111"
 FURTHER_COLORS = ("#8833aa", "#cc6611", "#2299aa", "#996655", "#556b2f")
 
 
@@ -112,10 +110,10 @@ def write_trajectory(
 
 def trajectories_of(run: Run, recording: Recording) -> List[Trajectory]:
     """Return those of the run with names and colors: the odometry first, then the truth if known, the best one last."""
-    found = [Trajectory(LABELS[name], COLORS[name], run.times, poses) for name, poses in run.poses.items()]
+    found = [Trajectory(name.replace("_", " "), _COLORS[name], run.times, poses) for name, poses in run.poses.items()]
     if recording.truth is not None:
         positions = aligned_truth(run.times, run.poses[ODOMETRY], recording.truth)
-        found.insert(1, Trajectory("truth", TRUTH_COLOR, recording.truth.times, positions))
+        found.insert(1, Trajectory("truth", _COLORS["truth"], recording.truth.times, positions))
     return found
 
 

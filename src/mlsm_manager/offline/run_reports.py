@@ -7,7 +7,6 @@ from typing import Any, Dict, List
 import numpy as np
 
 from georeferencing.adjustment import Adjusted
-from mlsm_manager.localisation.updates import ScanUpdate
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.charts import CHART_FILES
 from mlsm_manager.offline.replay import CORRECTED, ODOMETRY
@@ -101,11 +100,14 @@ def mission_of(mapped: MappedBag, errors: Dict[str, Dict[str, float]]) -> Missio
 def _facts(mapped: MappedBag) -> Dict[str, str]:
     recording, run, odometry = mapped.recording, mapped.run, mapped.odometry
     length, counts = float(np.hypot(*np.diff(run.best[:, :2], axis=0).T).sum()), run.counts
-    origin = run.stored.origin
+    origin, begin = run.stored.origin, datetime.fromtimestamp(recording.beams[0].beam.stamp_ns * 1e-9, timezone.utc)
+    heights = np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])
+    shallow, deep = -np.percentile(heights, [95.0, 5.0]) + 0.0
     return {
-        "date": _date(recording.beams[0].beam.stamp_ns * 1e-9),
+        # A clock that was never set, or a simulated one, counts from 1970.
+        "date": begin.strftime("%Y-%m-%d %H:%M UTC") if begin.year >= _FIRST_YEAR else "not recorded",
         "place": "not told; N? is north if headings count from east" if origin is None else str(origin),
-        "depth": _depth(np.array([placed.T_target_sonar[2, 3] for placed in recording.beams])),
+        "depth": f"{shallow:.1f} to {deep:.1f} m" if np.ptp(heights) > 0.0 else "not recorded",
         "accuracy": _accuracy(mapped),
         "distance travelled": f"{length:.0f} m",
         "duration": f"{recording.seconds / 60.0:.1f} minutes",
@@ -114,18 +116,6 @@ def _facts(mapped: MappedBag) -> Dict[str, str]:
         "scans": f"{counts['scans']}: {counts['matched']} matched, {counts['rejected']} rejected",
         "map": f"{counted(counts['blocks'], 'block')}, cells of {run.blocks.resolution:g} m",
     }
-
-
-def _date(time: float) -> str:
-    """Return the day and minute; a clock that was never set, or a simulated one, counts from 1970."""
-    begin = datetime.fromtimestamp(time, timezone.utc)
-    return begin.strftime("%Y-%m-%d %H:%M UTC") if begin.year >= _FIRST_YEAR else "not recorded"
-
-
-def _depth(heights: np.ndarray) -> str:
-    """Return between which depths nearly all beams were taken; heights: (n,) m, of the sonar."""
-    shallow, deep = -np.percentile(heights, [95.0, 5.0]) + 0.0
-    return f"{shallow:.1f} to {deep:.1f} m" if np.ptp(heights) > 0.0 else "not recorded"
 
 
 def _accuracy(mapped: MappedBag) -> str:
@@ -148,24 +138,17 @@ def _scan_records(mapped: MappedBag) -> List[ScanRecord]:
     records, before = [], 0
     for update in mapped.replayed.updates:
         after = int(np.searchsorted(stamps, update.scan.reference_time, side="right"))
+        missing = 0  # beams that did not come, where the head sends one every `pace` seconds
+        if 0.0 < pace < np.inf:
+            missing = int(np.maximum(np.round(np.diff(stamps[before:after]) / pace) - 1.0, 0.0).sum())
+        rejection = ""
+        if not update.accepted:
+            result = update.result
+            rejection = "no match was made" if result is None else result.reason or result.status.value
         points = _in_map(update.scan, mapped)
-        missing = _missing(stamps[before:after], pace)
-        records.append(ScanRecord(update.scan.reference_time, points, after - before, missing, _rejection(update)))
+        records.append(ScanRecord(update.scan.reference_time, points, after - before, missing, rejection))
         before = after
     return records
-
-
-def _missing(stamps: np.ndarray, pace: float) -> int:
-    """Return how many beams did not come, where the head sends one every `pace` seconds."""
-    if not 0.0 < pace < np.inf:
-        return 0
-    return int(np.maximum(np.round(np.diff(stamps) / pace) - 1.0, 0.0).sum())
-
-
-def _rejection(update: ScanUpdate) -> str:
-    if update.accepted:
-        return ""
-    return update.result.reason or update.result.status.value if update.result is not None else "no match was made"
 
 
 def _in_map(scan: Scan, mapped: MappedBag) -> np.ndarray:

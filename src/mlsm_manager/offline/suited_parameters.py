@@ -124,28 +124,15 @@ def with_cells(parameters: ReplayParameters, scans: Sequence[Scan], fixed: Colle
     return parameters.changed({"resolution": min(cell, parameters.resolution)})
 
 
-def may_strafe(ahead: Solution) -> bool:
-    """Return whether scans do not go on in a run of a vehicle that is taken to go ahead, or are too few to tell."""
-    return _goes_on(ahead) is not Answer.FINE
-
-
-def goes_astray(believed: Solution) -> bool:
-    """Return whether scans do not go on in a run that is solved as if the vehicle goes as reported."""
-    return _goes_on(believed) is Answer.DOUBTFUL
-
-
-def _goes_on(run: Solution) -> Answer:
+def goes_on(run: Solution) -> Answer:
+    """Return whether scans go on in a run that is solved as if the vehicle goes ahead, or as it reports."""
     return scans_go_on(run.log.node_times[1:], shares_heard_before(run, 0), _WORTH_TRYING).answer
-
-
-def _length(run: Solution) -> float:
-    """Return the length of the path of a run, m."""
-    return float(np.hypot(*np.diff(run.places, axis=0).T).sum())
 
 
 def goes_on_better(believed: Solution, alone: Solution) -> bool:
     """Return whether scans go on in the run `alone`, and clearly better than in the one that is `believed`."""
     shares, others = (shares_heard_before(run, 0) for run in (alone, believed))
     gain = float(np.nanmean(shares) - np.nanmean(others))
-    needed = _SHORTER if _length(alone) < _length(believed) else _CLEARLY
+    by_alone, by_believed = (float(np.hypot(*np.diff(run.places, axis=0).T).sum()) for run in (alone, believed))
+    needed = _SHORTER if by_alone < by_believed else _CLEARLY
     return gain > needed and not scans_go_on(alone.log.node_times[1:], shares).fires

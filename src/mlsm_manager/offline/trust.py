@@ -19,9 +19,9 @@ _MATTERS = 1.2  # times as large a deviation: less is not worth a doubt
 class Trust:
     """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
 
-    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
-    nobody measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing
-    tells. untold: a clause of what no check of such a run can tell; empty where there is nothing such.
+    matched: scans that were compared with others. causes: of what is wrong, ranked. assumed: what nobody measured and
+    the path rests on. if_so: m, the largest deviation if that is so; NaN where nothing tells. untold: a clause of what
+    no check of such a run can tell, or nothing.
     """
 
     verdicts: List[Verdict]
@@ -60,7 +60,7 @@ class Trust:
 
     @property
     def line(self) -> str:
-        return f"{self._answered}; {self.untold}" if self.untold else self._answered
+        return "; ".join(filter(None, [self._answered, self.untold]))
 
     @property
     def _answered(self) -> str:
@@ -94,10 +94,8 @@ class Trust:
 
     @property
     def _not_measured(self) -> str:
-        reason = self.assumed.text or f"none of {len(self.verdicts)} checks had enough data"
-        few = too_few(self.matched)
-        if few:
-            reason = f"{few}; {self.assumed.text}" if self.assumed.text else few
+        reasons = "; ".join(filter(None, [too_few(self.matched), self.assumed.text]))
+        reason = reasons or f"none of {len(self.verdicts)} checks had enough data"
         if not self._is_told:
             return f"{reason}; {_NOTHING}"
         if not self.assumed.text:

@@ -20,8 +20,3 @@ def scale_bar(width: float) -> float:
 def north(origin: Optional[Origin]) -> np.ndarray:
     """Return the unit vector (2,) in map that points north: y where nothing tells the azimuth (REP-103)."""
     return rotated(np.array([0.0, 1.0]), np.array(0.0 if origin is None else -origin.yaw))
-
-
-def north_label(origin: Optional[Origin]) -> str:
-    """Return the letter at the arrow, with a question mark where only REP-103 says that x is east."""
-    return "N" if origin is not None else "N?"

@@ -8,8 +8,8 @@ import numpy as np
 import plotly.graph_objects as go
 from PIL import Image
 
-from mlsm_manager.report.compass_rose import north, north_label, scale_bar
-from mlsm_manager.report.mission import Mission, Path, Uncertainty
+from mlsm_manager.report.compass_rose import north, scale_bar
+from mlsm_manager.report.mission import Mission, Path
 from mlsm_manager.surface_map.export.rasters import counts, ridges
 
 SCAN_TRACE = "scan at the chosen time"
@@ -35,7 +35,11 @@ def map_from_above(mission: Mission) -> go.Figure:
         shown = thinned(path)
         _add_line(figure, shown.poses[:, 0], shown.poses[:, 1], path.name, path.color)
     if mission.uncertainty is not None:
-        _add_uncertainty(figure, mission.best, mission.uncertainty)
+        x, y = mission.uncertainty.ellipses(mission.best, _MOST_ELLIPSES).astype(np.float32).T
+        _add_line(figure, x, y, "two standard deviations", _DOUBT, width=1)
+        x, y = mission.uncertainty.doubtful_parts(mission.best).T
+        if len(x):
+            _add_line(figure, x, y, "doubtful", "rgba(204,51,119,0.35)", width=9)
     figure.add_trace(go.Scatter(x=[], y=[], mode="markers", name=SCAN_TRACE, marker={"color": _SCAN, "size": 4}))
     figure.add_trace(
         go.Scatter(
@@ -53,7 +57,7 @@ def _add_map(figure: go.Figure, mission: Mission) -> None:
     numbers, low, side = counts(mission.blocks)
     (left, bottom), (right, top) = low * side, (low + numbers.shape[::-1]) * side
     figure.add_layout_image(
-        source=_data_url(_drawn(numbers[::-1])), xref="x", yref="y", x=left, y=top, sizex=right - left,
+        source=_drawn(numbers[::-1]), xref="x", yref="y", x=left, y=top, sizex=right - left,
         sizey=top - bottom, sizing="stretch", layer="below",
     )  # fmt: skip
     lines = np.pad(ridges(mission.blocks), ((0, 0), (0, 1), (0, 0)), mode="constant", constant_values=np.nan)
@@ -64,8 +68,8 @@ def _add_map(figure: go.Figure, mission: Mission) -> None:
     font, ahead = {"color": _INK, "size": 13}, north(mission.origin)
     figure.add_annotation(x=left + bar / 2.0, y=bottom, text=f"{bar:g} m", yanchor="bottom", showarrow=False, font=font)
     figure.add_annotation(
-        text=north_label(mission.origin), xref="paper", yref="paper", x=1.0, y=0.97, xshift=14, ax=-46.0 * ahead[0],
-        ay=46.0 * ahead[1], arrowhead=2, arrowwidth=2.5, arrowcolor=_INK, showarrow=True, font=font,
+        text="N?" if mission.origin is None else "N", xref="paper", yref="paper", x=1.0, y=0.97, xshift=14, font=font,
+        ax=-46.0 * ahead[0], ay=46.0 * ahead[1], arrowhead=2, arrowwidth=2.5, arrowcolor=_INK, showarrow=True,
     )  # fmt: skip
 
 
@@ -74,7 +78,14 @@ def map_in_3d(mission: Mission) -> go.Figure:
     step = max(1, -(-len(mission.blocks) // _MOST_BLOCKS))
     blocks = mission.blocks.take(np.arange(0, len(mission.blocks), step))
     mean = blocks.mean.astype(np.float32)
-    figure = go.Figure(_blocks_in_3d(mean, "map" if step == 1 else f"map, one block of {step}"))
+    bar, name = {"title": "z [m]", "thickness": 14, "len": 0.6}, "map" if step == 1 else f"map, one block of {step}"
+    # As diamonds: plotly makes a circle, also one of a pixel, of 19 triangles, a diamond of 5.
+    marker = {"size": 1.5, "symbol": "diamond", "color": mean[:, 2], "colorscale": "Turbo", "colorbar": bar}
+    figure = go.Figure(
+        go.Scatter3d(
+            x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip", marker=marker
+        )
+    )
     path = thinned(mission.best)
     height = np.full(len(path.times), float(np.median(mean[:, 2])) if len(mean) else 0.0, dtype=np.float32)
     figure.add_trace(
@@ -91,18 +102,6 @@ def map_in_3d(mission: Mission) -> go.Figure:
         xaxis_title="x [m]", yaxis_title="y [m]", zaxis_title="z [m]",
     )  # fmt: skip
     return _laid_out(figure, 600)
-
-
-def _blocks_in_3d(mean: np.ndarray, name: str) -> go.Scatter3d:
-    """Return blocks at their means (n, 4), in the colour of their height.
-
-    As diamonds: plotly makes a circle, also one of a pixel, of 19 triangles, a diamond of 5.
-    """
-    bar = {"title": "z [m]", "thickness": 14, "len": 0.6}
-    return go.Scatter3d(
-        x=mean[:, 0], y=mean[:, 1], z=mean[:, 2], mode="markers", name=name, hoverinfo="skip",
-        marker={"size": 1.5, "symbol": "diamond", "color": mean[:, 2], "colorscale": "Turbo", "colorbar": bar},
-    )  # fmt: skip
 
 
 def correction_over_time(mission: Mission) -> go.Figure:
@@ -143,14 +142,6 @@ def thinned(path: Path) -> Path:
     return Path(path.name, path.color, path.times[::step], path.poses[::step].astype(np.float32))
 
 
-def _add_uncertainty(figure: go.Figure, best: Path, uncertainty: Uncertainty) -> None:
-    x, y = uncertainty.ellipses(best, _MOST_ELLIPSES).astype(np.float32).T
-    _add_line(figure, x, y, "two standard deviations", _DOUBT, width=1)
-    x, y = uncertainty.doubtful_parts(best).T
-    if len(x):
-        _add_line(figure, x, y, "doubtful", "rgba(204,51,119,0.35)", width=9)
-
-
 def _add_line(
     figure: go.Figure, x: np.ndarray, y: np.ndarray, name: str, color: str, width: float = 2, hidden: bool = False
 ) -> None:
@@ -170,17 +161,13 @@ def _laid_out(figure: go.Figure, height: Optional[int]) -> go.Figure:
     )  # fmt: skip
 
 
-def _drawn(points: np.ndarray) -> Image.Image:
-    """Return a picture of numbers of points (h, w), transparent where there are none."""
+def _drawn(points: np.ndarray) -> str:
+    """Return a picture of numbers of points (h, w), transparent where there are none, as an address."""
     image = np.empty((*points.shape, 4), dtype=np.uint8)
     image[..., :3] = _POINTS
     share = np.log1p(points) / max(np.log1p(np.percentile(points[points > 0], 95)), 1e-9)
     opacity = _FAINTEST + (_STRONGEST - _FAINTEST) * np.minimum(share, 1.0)
     image[..., 3] = np.where(points > 0, 255.0 * opacity, 0.0)
-    return Image.fromarray(image, "RGBA")
-
-
-def _data_url(image: Image.Image) -> str:
     written = BytesIO()
-    image.save(written, format="PNG", optimize=True)
+    Image.fromarray(image, "RGBA").save(written, format="PNG", optimize=True)
     return "data:image/png;base64," + base64.b64encode(written.getvalue()).decode("ascii")

@@ -87,6 +87,9 @@ def write_report(path: Path, mission: Mission) -> None:
 def report_page(mission: Mission) -> str:
     """Return the page; it needs no other file and no network."""
     lights = [light_of(verdict) for verdict in mission.verdicts]
+    rejected = [
+        (f"{scan.time - mission.start:.0f}", escape(scan.rejection)) for scan in mission.scans if scan.rejection
+    ]
     checks = [(_lamp(light), escape(verdict.question or verdict.name), escape(sentence(verdict)), light.value)
               for verdict, light in zip(mission.verdicts, lights)]  # fmt: skip
     page = Template((package_folder() / "web/templates/report.html").read_text(encoding="utf-8"))
@@ -102,7 +105,7 @@ def report_page(mission: Mission) -> str:
         correction=_figure(correction_over_time(mission), "correction"),
         health=_figure(sensor_health(mission), "health"),
         calibration=_calibration(mission),
-        rejected=_rejected(mission),
+        rejected=_table(("time [s]", "why"), rejected) if rejected else "<p>No scan was rejected.</p>",
         parameters=_table(("parameter", "value"), _words(mission.parameters)),
         last_scan=len(mission.scans) - 1,
         scan_trace=SCAN_TRACE,
@@ -138,11 +141,6 @@ def _calibration(mission: Mission) -> str:
         if deviation > 0.0  # others are no unknowns of this run, as those of an odometry that nobody reports
     ]
     return _table(("", "in truth", "standard deviation"), rows) if rows else "<p>Nothing was calibrated.</p>"
-
-
-def _rejected(mission: Mission) -> str:
-    rows = [(f"{scan.time - mission.start:.0f}", escape(scan.rejection)) for scan in mission.scans if scan.rejection]
-    return _table(("time [s]", "why"), rows) if rows else "<p>No scan was rejected.</p>"
 
 
 def _words(values: Mapping[str, object]) -> List[Tuple[str, str]]:
@@ -181,21 +179,17 @@ def slider_json(mission: Mission) -> str:
     """
     scans: List[Dict[str, object]] = []
     for scan in mission.scans:
-        vehicle = mission.best.at(scan.time)
+        vehicle, step = mission.best.at(scan.time), max(1, -(-len(scan.points) // _MOST_POINTS))
+        near = np.clip((scan.points[:, :2] - vehicle)[::step], -_FARTHEST, _FARTHEST)
+        packed = np.round(near / _UNIT).astype("<i2").tobytes()
         scans.append(
             {
                 "time": round(scan.time - mission.start, 1),
                 "vehicle": [round(value, 2) for value in vehicle.tolist()],
                 "echoes": len(scan.points),
                 "rejection": scan.rejection,
-                "points": _packed(scan.points[:, :2] - vehicle),
+                "points": base64.b64encode(packed).decode("ascii"),
             }
         )
     # A page may hold no "</" inside a script.
     return json.dumps({"unit": _UNIT, "scans": scans}).replace("</", "<\\/")
-
-
-def _packed(points: np.ndarray) -> str:
-    step = max(1, -(-len(points) // _MOST_POINTS))
-    near = np.clip(points[::step], -_FARTHEST, _FARTHEST)
-    return base64.b64encode(np.round(near / _UNIT).astype("<i2").tobytes()).decode("ascii")

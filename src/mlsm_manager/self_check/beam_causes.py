@@ -1,16 +1,16 @@
-"""Causes that beams of a head that turns show by themselves: a blind side, and settings that changed in mid-run."""
+"""Causes that beams show by themselves: a head that stood, a blind side, and settings that changed in mid-run."""
 
-from typing import List, Optional, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind
-from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.causes import CERTAIN, Cause
 from node_support.timing import stretches
 from sonar_processing.beams.beam import Beam
 
 _CERTAIN = 500.0  # nats: of what needs no comparison of scans to be seen
-_MOSTLY = 0.5  # share of the beams that are like themselves at twice the range
+_MOSTLY = 0.5  # share of the beams that are alike, of some seconds or at twice the range; in turns they shift by bins
 _SECTORS, _BLIND = 36, 15  # of the circle; so many beside each other, 150 degrees, hear nothing while the others do
 _HEARS, _DEAF = 0.3, 0.02  # shares of the beams of a sector that hear something
 _SIDE = 60.0  # s before and after a change that are compared: some turns of the head
@@ -21,6 +21,15 @@ _USUAL = [0.05, 0.95]  # shares of the beams that have shorter ranges: a few may
 _SAMPLE = 400  # beams that tell whether echoes come twice
 _RATIOS = np.array([2.0, 1.5, 1.6, 1.7, 1.8, 1.9, 2.1, 2.2, 2.3, 2.5])  # of ranges: twice, and others by chance
 _NEAREST = 1.0 / 3.0  # of the range, from which on echoes are compared with those nearer
+_STANDS = 20.0  # s: longer than any head waits between two beams, about a turn
+_NAMED = 10.0  # s: shorter times in which all directions hear the same are left out, but not named
+_STILL = 1e-3  # rad: heads step by ten times as much
+_NEVER_TURNS = 0.9  # share of the beams of one angle, from which on the head is not meant to turn
+_ALIKE = 0.25  # of the difference of strengths to their sum: beams of one direction have less, of others three times it
+# The usual difference, of so many beams, from which on alike ones tell that the head stands: sonars that hear noise
+# alone have up to 0.51, those that hear walls 0.76 and more.
+_DIFFER, _BEAMS = 0.6, 500
+_SPEED = 0.3  # m/s: the usual speed of a small vehicle, which nothing corrects while the head stands
 
 
 def of_trembling(degrees: float, is_mended: bool) -> Cause:
@@ -37,7 +46,9 @@ def beam_causes(beams: Sequence[Beam]) -> List[Cause]:
         begin, ratio = stronger
         text = f"the gain changed: echoes are {ratio:.1f} times as strong from then on"
         causes.append(Cause(text, _CERTAIN / 10.0, begin, metres=1.0))
-    longer = _change(times, np.array([_length(beam) for beam in heard]))
+    # How many bins are strong, m.
+    loud = [np.count_nonzero(beam.intensities > beam.intensities.max() / 2) * beam.range_resolution for beam in heard]
+    longer = _change(times, np.array(loud))
     if longer is not None:
         # Echoes that are longer than they were may be as long as ever, in reported ranges longer than the true ones.
         begin, ratio = longer
@@ -93,12 +104,6 @@ def _alike_at(strengths: np.ndarray) -> np.ndarray:
         return np.corrcoef(strengths[bins], nearer)[0, 1:]
 
 
-def _length(beam: Beam) -> float:
-    """Return how many bins are strong, m."""
-    strengths = beam.intensities
-    return float(np.count_nonzero(strengths > strengths.max() / 2)) * beam.range_resolution
-
-
 def _change(times: np.ndarray, values: np.ndarray) -> Optional[Tuple[float, float]]:
     """Return when [s] the median of `values` (n,) stepped, where both sides are steady, and by which factor."""
     if len(times) < _FEWEST:
@@ -116,3 +121,81 @@ def _change(times: np.ndarray, values: np.ndarray) -> Optional[Tuple[float, floa
         if steady and factor > largest:
             found, largest = (moment, after / before), factor
     return found
+
+
+class HeadStood(NamedTuple):
+    """From when to when [s] the head stood; is_told: whether it reported one angle all the time."""
+
+    begin: float
+    end: float
+    is_told: bool
+
+    @property
+    def seconds(self) -> float:
+        return self.end - self.begin
+
+
+def head_stood(beams: Sequence[Beam], usual: float = 0.0) -> Tuple[List[HeadStood], float]:
+    """Return when the head stood, of beams in the order of their stamps; told, it did so for more than 20 s.
+
+    The second value tells how different beams of two directions are when the head turns: 0 equal, 1 nothing in common.
+    It is never less than `usual`, which is that of earlier beams.
+    """
+    times = np.array([beam.stamp_ns for beam in beams]) * 1e-9
+    angles = np.array([beam.angle for beam in beams])
+    untold, usual = _untold(times, angles, beams, usual)
+    return [*_told(times, angles), *untold], usual
+
+
+def of_standing(stood: Sequence[HeadStood]) -> List[Cause]:
+    """Return the causes: of each time that was told, and of the longest that was not."""
+    told = [one for one in stood if one.is_told]
+    untold = [one for one in stood if not one.is_told and one.seconds >= _NAMED]
+    longest = [max(untold, key=lambda one: one.seconds)] if untold else []
+    causes = []
+    for one in (*told, *longest):
+        text = f"the head stood for {one.seconds:.0f} s{'' if one.is_told else ' though it reported that it turns'},"
+        gone = _SPEED * float(np.sqrt(one.seconds * _STANDS)) / 2.0
+        causes.append(Cause(text, CERTAIN, one.begin, metres=gone))
+    return causes
+
+
+def _told(times: np.ndarray, angles: np.ndarray) -> List[HeadStood]:
+    """Return stretches in which the head reports one angle, unless it never turns."""
+    still = _are_equal(angles[1:], angles[:-1])
+    if not len(still) or still.mean() > _NEVER_TURNS:
+        return []
+    found = [HeadStood(float(times[first]), float(times[last]), True) for first, last in stretches(still)]
+    return [one for one in found if one.seconds > _STANDS]
+
+
+def _untold(
+    times: np.ndarray, angles: np.ndarray, beams: Sequence[Beam], usual: float
+) -> Tuple[List[HeadStood], float]:  # fmt: skip
+    """Return stretches in which all directions hear the same, though the head reports that it turns."""
+    apart = max(len(beams) // 400, 10)  # beams after which the head usually looks elsewhere
+    strengths = [beam.intensities.astype(np.float32) for beam in beams]
+    differences = np.array([_difference(*pair) for pair in zip(strengths, strengths[apart:])])
+    told = np.isfinite(differences) & ~_are_equal(angles[apart:], angles[:-apart])
+    count = int(np.count_nonzero(told))
+    if count >= 2 * apart:
+        parts = np.array_split(differences[told], max(count // _BEAMS, 1))
+        usual = max(usual, *(float(np.median(part)) for part in parts))
+    near = np.ones(6 * apart + 1) / (6 * apart + 1)
+    if len(differences) < len(near) or usual < _DIFFER:
+        return [], usual
+    share = np.convolve(np.where(told, differences, np.inf) < _ALIKE, near, "same")
+    found = stretches(share > _MOSTLY)
+    return [HeadStood(float(times[first]), float(times[last - 1 + apart]), False) for first, last in found], usual
+
+
+def _difference(one: np.ndarray, other: np.ndarray) -> float:
+    """Return how different the strengths of two beams are: 0 equal, 1 nothing in common; NaN where both are silent."""
+    if len(one) != len(other):
+        return 1.0
+    total = float(one.sum() + other.sum())
+    return float(np.abs(one - other).sum()) / total if total else np.nan
+
+
+def _are_equal(angles: np.ndarray, others: np.ndarray) -> np.ndarray:
+    return np.abs(np.angle(np.exp(1j * (angles - others)))) < _STILL

@@ -23,7 +23,10 @@ _MOST = 3  # stretches: pairs tell how long one is worse than a fit does
 
 
 class _Stretch(NamedTuple):
-    """first, last: scans. pairs: (p, 2) of these. velocity: (2,) m/s in their frame. nats: over one without."""
+    """first, last: numbers of scans. pairs: (p, 2) of these. velocity: (2,) m/s in the frame of the pairs.
+
+    nats: over a vehicle that was not carried.
+    """
 
     first: int
     last: int
@@ -65,8 +68,9 @@ def _cause(pairs: ScanPairs, found: _Stretch, base: Hypothesis) -> Cause:
 
 
 def _likeliest(pairs: ScanPairs, base: Hypothesis, farther: float) -> List[_Stretch]:
-    """Return the likeliest stretches, each of another number of scans; their evidence is less by the logarithm of how
-    many were tried. farther: see `carried`.
+    """Return the likeliest stretches, each of another number of scans; farther: see `carried`.
+
+    Their evidence is less by the logarithm of how many were tried.
     """
     numbers, distances = pairs.near(base)
     count, speeds, apart = len(pairs.middles), grid(_SPEEDS), farther * float(np.median(distances))

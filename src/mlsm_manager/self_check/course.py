@@ -49,11 +49,6 @@ class CourseFound(NamedTuple):
         """What the deviation does not explain of the turn, rad."""
         return float(np.sqrt(max(self.turn**2 - self.deviation**2, 0.0)))
 
-    @property
-    def hidden(self) -> float:
-        """By how much a sonar may be turned that seems turned so beside a DVL, whose own turn may hide more, rad."""
-        return float(np.hypot(self.turn, self.deviation))
-
     def after(self, before: "CourseFound") -> "CourseFound":
         """Return what is known of the mount if so much was known `before`.
 
@@ -63,8 +58,7 @@ class CourseFound(NamedTuple):
         return before if before.is_told and not (self.is_told or self.strafes) else self
 
 
-NOT_TOLD = CourseFound(0.0, np.inf)
-"""Of a vehicle that was not seen for long enough."""
+NOT_TOLD = CourseFound(0.0, np.inf)  # of a vehicle that was not seen for long enough
 
 
 def course_of(path: Track, largest: float = LARGEST, mostly: float = _MOSTLY) -> CourseFound:
@@ -86,21 +80,15 @@ def course_of(path: Track, largest: float = LARGEST, mostly: float = _MOSTLY) ->
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     aside = wrapped(angles - middle)
     spread = 1.48 * float(np.median(np.abs(aside)))
-    deviation = np.hypot(1.25 * spread / np.sqrt(_worth(aside, spread)), _AHEAD)
+    # A vehicle that slips goes on to do so: in a marina neighbours correlate by .6 to .7, others hardly, and tell less.
+    usual = np.clip(aside, -_FAR * spread, _FAR * spread)
+    alike = float((usual[1:] * usual[:-1]).mean() / max((usual**2).mean(), np.finfo(float).tiny))
+    independent = len(aside) / (1.0 + 2.0 * max(alike, 0.0))
+    deviation = np.hypot(1.25 * spread / np.sqrt(independent), _AHEAD)
     # A vehicle that strafes may go one way for half of its time, and the median tells only that.
     strafes = bool(np.quantile(np.abs(aside), mostly) > _STRAFES or abs(middle) > largest)
     is_clear = deviation <= _VAGUE or abs(middle) > _CLEAR * deviation
     return CourseFound(-middle, float(deviation) if is_clear and not strafes else np.inf, strafes)
-
-
-def _worth(aside: np.ndarray, spread: float) -> float:
-    """Return how many stretches of courses that differ by chance are worth these, which go `aside` (n,) [rad].
-
-    A vehicle that slips goes on to do so: in a marina neighbours correlate by .6 to .7, others hardly.
-    """
-    usual = np.clip(aside, -_FAR * spread, _FAR * spread)
-    alike = float((usual[1:] * usual[:-1]).mean() / max((usual**2).mean(), np.finfo(float).tiny))
-    return len(aside) / (1.0 + 2.0 * max(alike, 0.0))
 
 
 def moves_are_turned(reported: Track, turn: float) -> bool:

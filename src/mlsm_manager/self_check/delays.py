@@ -9,10 +9,8 @@ from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.self_check.causes import NAMED_FROM, Cause
 from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis, ScanPairs, around, evidence_of
 
-LATE = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))
-"""Delays that may hold all along."""
-LATE_BY = 1.0
-"""m, by which beams of wrong stamps make the path unsure: what a small vehicle goes in some seconds."""
+LATE = around(AS_TOLD, "delay", np.arange(-12.0, 13.0, 2.0))  # that may hold all along
+LATE_BY = 1.0  # m, by which wrong stamps make the path unsure: what a small vehicle goes in some seconds
 _LATE_TOLD = 3.0  # s: three deviations of what is known of a head's delay
 _DELAYS = np.arange(-8.0, 8.5, 0.5)  # s, before and after a change, or at the beginning and at the end
 _FEWEST = 6  # pairs of scans that tell a delay

@@ -40,8 +40,7 @@ _HEADING, _SCALE, _LENGTH = np.radians(1.8), 0.1, 0.06
 # Nats by which a run must fit better without a fault of the sonar. For one of the odometry it is NAMED_FROM: wrong
 # changes of distances, where half of the circle was heard, gained 6.4, wrong steps of the compass in a marina 6.
 _NATS_SONAR = 5.0
-# The same for these faults beside a compass alone, as nothing reports speeds there. Parts of an unbroken marina gain 8
-# by a wrong tilt, a tilted one 27.
+# The same for these beside a compass alone: parts of an unbroken marina gain 8 by a wrong tilt, a tilted one 27.
 _NATS_ALONE = 15.0
 _VAGUE_ALONE = (SonarKind.RANGES, SonarKind.TILT, FaultKind.SLIP, FaultKind.STEP)
 # The same for a compass that errs by the heading, where it is alone or errs by less than 5 deg. Alone, an unbroken one

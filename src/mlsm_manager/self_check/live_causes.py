@@ -13,7 +13,7 @@ from mlsm_manager.odometry.faults import FaultKind
 from mlsm_manager.odometry.mending import stuck_headings
 from mlsm_manager.odometry.steps import Step
 from mlsm_manager.scan_matching.scan import Scan, Track, joined
-from mlsm_manager.self_check.beam_causes import head_causes
+from mlsm_manager.self_check.beam_causes import HeadStood, head_causes, head_stood, of_standing
 from mlsm_manager.self_check.causes import (
     NOTHING_ASSUMED,
     UNTOLD_ALONE,
@@ -32,7 +32,6 @@ from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.other_places import with_other_places
 from mlsm_manager.self_check.standing import standing_causes
-from mlsm_manager.self_check.standing_head import HeadStood, head_stood, of_standing
 from node_support.geometry import composed, move_of
 from sonar_processing.beams.beam import Beam
 

@@ -8,8 +8,7 @@ from mlsm_manager.self_check.verdict import Verdict, merged, moment, percent
 
 _WINDOW = 20  # scans in which some may lie beside the others
 _MAY_BE_BESIDE = 0.2  # share of these: a vehicle that comes around a corner hears new water
-AGREES = 0.5
-"""Share of a scan's points on known surfaces from which on the scan agrees: the larger part."""
+AGREES = 0.5  # share of a scan's points on known surfaces from which on the scan agrees: the larger part
 _GOOD_ODOMETRY = 0.1  # relative deviation of reported distances up to which these tell the way along a canal
 _SCANS = 10  # about 2 minutes, in which a small vehicle passes what it hears
 

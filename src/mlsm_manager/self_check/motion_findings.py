@@ -6,12 +6,13 @@ from typing import List, Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult
-from mlsm_manager.joint_solver.motion_models import DIRECTION
-from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION
+from mlsm_manager.joint_solver.motion_models import DIRECTION, SCALE
+from mlsm_manager.joint_solver.normal_equations import HELD_DEVIATION, RANGE_SCALE
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
+from mlsm_manager.odometry.faults import FaultKind, MotionFault
 from mlsm_manager.scan_matching.scan import Scan, Track
-from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, is_same
+from mlsm_manager.self_check.causes import NOTHING_ASSUMED, Assumption, Cause, is_same, unsure_length
 from mlsm_manager.self_check.course import (
     MOSTLY_ALONE,
     NAMED,
@@ -24,12 +25,15 @@ from mlsm_manager.self_check.course import (
 )
 from mlsm_manager.self_check.delays import late_cause
 from mlsm_manager.self_check.echo_causes import turn_text
-from mlsm_manager.self_check.lengths import assumed_of_distances, assumed_of_lengths, length_causes
 from mlsm_manager.self_check.scan_pairs import Hypothesis
 from node_support.geometry import move_of, rotated, transformed
 
 _UNLIKELY = 3.0  # deviations of what was known before the run of direction and delay, as of its calibration
 _UNLIKELY_DELAY = 2.5
+_SHORTEST = 0.05  # true over reported distances: a fit of what makes no sense may go back, and tells no length
+_ODD_LENGTH = np.log(1.2)  # a sonar's ranges and a DVL's distances are right to some percent
+_UNLIKELY_LENGTH = np.log(1.7)  # thrusters err by a third; sonars set to half or twice the range, and feet, by more
+_ODD_RANGES = 1.0  # deviations of what was known of the ranges: beyond, a DVL's distances are wrong as often as these
 
 
 @dataclass(frozen=True)
@@ -100,7 +104,9 @@ class MotionFindings:
         places, direction = self.run.places, NOT_TOLD if course.is_told else self._direction
         turn, mounts = course.unexplained, 0.0
         if direction.is_told:
-            turn, mounts = (direction.hidden, direction.hidden) if may_hide else (direction.turn, 0.0)
+            # The DVL's own turn may hide more.
+            hidden = float(np.hypot(direction.turn, direction.deviation))
+            turn, mounts = (hidden, hidden) if may_hide else (direction.turn, 0.0)
         gone = places - begin
         aside = rotated(gone, np.full(len(gone), turn)) - gone
         causes = [*self.causes, *(course_causes(course, named) or self._calibration_causes())]
@@ -142,8 +148,15 @@ class MotionFindings:
         return CourseFound(-turn, float(model.first_deviations()[DIRECTION]))
 
     def _calibration_causes(self) -> List[Cause]:
-        """Return what is unlikely of the lengths, the direction and the delay that the run found."""
-        found, direction = length_causes(self.run), self._direction
+        """Return what is unlikely of the lengths, the direction and the delay that the run found.
+
+        Where distances and ranges contradict each other, nothing in a run tells which are wrong.
+        """
+        found, direction, length = [], self._direction, _odometry_length(self.run)
+        if abs(length) > _UNLIKELY_LENGTH:
+            size = length / self.run.parameters.odometry.distance_deviation
+            text = MotionFault(FaultKind.LENGTH, np.nan, (length,)).text
+            found.append(Cause(text, 0.5 * size**2, length=unsure_length(length)))
         delay, deviation = self._delay
         size = abs(delay) / deviation
         if size > _UNLIKELY_DELAY:
@@ -173,3 +186,35 @@ class MotionFindings:
             return scan
         moves = move_of(reported.at(scan.times), self.track.at(scan.times))
         return replace(scan, points=transformed(moves, scan.points), track=self.track)
+
+
+def assumed_of_lengths(run: Solution) -> Assumption:
+    """Return which of both a run took for right, where they contradict each other clearly.
+
+    Nobody knows the odometry of a run whose model has a rival.
+    """
+    length = _odometry_length(run)
+    if abs(length) < _ODD_LENGTH or run.parameters.odometry.rival is None:
+        return assumed_of_distances(run)
+    text = f"the sonar's ranges are right, although the odometry's distances are {np.exp(-length):.2f} times as long"
+    return Assumption(f"{text} (name the odometry to decide)", 0.0, unsure_length(length))
+
+
+def assumed_of_distances(run: Solution) -> Assumption:
+    """Return that a run took its odometry's distances for right, where the ranges contradict them clearly."""
+    found, expected = (1.0 + values[RANGE_SCALE] for values in (run.state.run, run.parameters.run_mean(run.log)))
+    usual = max(run.parameters.run_deviations(run.log)[RANGE_SCALE], HELD_DEVIATION)
+    ranges = float(np.log(max(found, _SHORTEST) / expected))
+    if abs(ranges) <= _ODD_RANGES * usual:
+        return NOTHING_ASSUMED
+    text = f"the odometry's distances are right, although the sonar's ranges are {np.exp(-ranges):.2f} times as long"
+    return Assumption(f"{text} (measure a known distance to decide)", 0.0, unsure_length(ranges))
+
+
+def _odometry_length(run: Solution) -> float:
+    """Return the logarithm of true distances over reported ones, as a run found it; zero where it tells none."""
+    model = run.parameters.odometry
+    if SCALE not in model.calibrated.values():
+        return 0.0
+    found, expected = (1.0 + node[SCALE] for node in (run.state.nodes[-1], model.first_node()))
+    return float(np.log(found / expected)) if found > _SHORTEST else 0.0

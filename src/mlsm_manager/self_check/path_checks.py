@@ -26,13 +26,15 @@ def against_odometry(
 ) -> Tuple[Verdict, Verdict]:
     """Return verdicts on the distances along and across the odometry's, in standard deviations of the odometry.
 
-    A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step. The
-    odometry's scale is known far better than that.
+    A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step.
 
-    times: (m,) s. odometry, corrected: (m, >= 2) positions. scale_deviation and position_walk [m/sqrt(s)]: of the
-    odometry.
+    scale_deviation and position_walk [m/sqrt(s)]: of the odometry.
     """
-    starts, by_odometry, ratio = _ratios(times, odometry, corrected)
+    starts = np.arange(times[0], times[-1] - _WINDOW, _STEP)
+    paths = (path[:, 0] + 1j * path[:, 1] for path in (odometry, corrected))
+    moves = [np.interp(starts + _WINDOW, times, path) - np.interp(starts, times, path) for path in paths]
+    far = np.abs(moves[0]) > _SHORTEST
+    starts, by_odometry, ratio = starts[far], moves[0][far], moves[1][far] / moves[0][far]
     walk = position_walk**2 * _WINDOW / np.abs(by_odometry) ** 2
     longer = np.abs(ratio) - 1.0
     turned = np.angle(ratio * np.exp(-1j * np.median(np.angle(ratio)))) if len(ratio) else np.empty(0)
@@ -66,20 +68,6 @@ def _against_limit(name: str, text: str, deviations: np.ndarray, starts: np.ndar
     worst, doubtful = _worst(deviations), merged(starts[np.abs(deviations) > _LIMIT], _WINDOW)
     text += f" ({worst:.1f} standard deviations of the odometry, limit {_LIMIT:g})"
     return Verdict(name, worst, _LIMIT, text, doubtful=doubtful, question=question)
-
-
-def _ratios(
-    times: np.ndarray, odometry: np.ndarray, corrected: np.ndarray
-) -> Tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return of windows (n,) in which the vehicle goes far enough: starts [s], moves by the odometry as complex
-    numbers [m], and the corrected moves over these.
-    """
-    starts = np.arange(times[0], times[-1] - _WINDOW, _STEP)
-    ends = starts + _WINDOW
-    paths = (path[:, 0] + 1j * path[:, 1] for path in (odometry, corrected))
-    by_odometry, by_map = (np.interp(ends, times, path) - np.interp(starts, times, path) for path in paths)
-    far = np.abs(by_odometry) > _SHORTEST
-    return starts[far], by_odometry[far], by_map[far] / by_odometry[far]
 
 
 def _worst(deviations: np.ndarray) -> float:

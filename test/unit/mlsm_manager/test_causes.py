@@ -9,22 +9,21 @@ from benchmarks import fault_makers as broken
 from benchmarks import rare_faults as rare
 from benchmarks.faults import shortened, source
 from benchmarks.harness import mapped_as
-from made_recordings import SECONDS, scans_in, strafing, touring
+from made_recordings import SECONDS, looked_at, scans_in, strafing, touring
 from made_scans import later
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
 from mlsm_manager.localisation.following import Following
 from mlsm_manager.localisation.parameters import LocaliserParameters
 from mlsm_manager.odometry.steps import MotionLimits
-from mlsm_manager.offline.mended_recording import with_steady_head, with_turning_head
-from mlsm_manager.self_check.beam_causes import beam_causes
+from mlsm_manager.offline.heard_scans import with_steady_head, with_turning_head
+from mlsm_manager.self_check.beam_causes import beam_causes, head_stood, of_standing
 from mlsm_manager.self_check.causes import Cause, ranked, widened
 from mlsm_manager.self_check.course import CourseFound
 from mlsm_manager.self_check.echo_causes import echo_findings
 from mlsm_manager.self_check.live_causes import LiveCauses
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.standing import standing_causes
-from mlsm_manager.self_check.standing_head import head_stood, of_standing
 from mlsm_manager.self_check.verdict import Answer
 
 pytestmark = pytest.mark.long
@@ -78,6 +77,7 @@ def test_a_run_may_lie_anywhere_where_stamps_are_so_late_that_scans_meet_by_chan
 
 
 def test_nothing_is_named_where_nothing_is_wrong():
+    assert with_turning_head(WHOLE) == with_steady_head(WHOLE) == (WHOLE, [])
     assert found_in(WHOLE).causes == []
     assert beam_causes(WHOLE.sent) == []
     assert standing_causes(scans_in(WHOLE), WHOLE.track, WHOLE.track.poses) == []
@@ -109,19 +109,11 @@ def test_what_a_head_hears_while_it_stands_is_left_out_and_the_time_is_named(tel
     assert beam_causes(turning.sent) == []
 
 
-def test_all_is_left_of_what_a_head_hears_that_turns():
-    assert with_turning_head(WHOLE) == (WHOLE, [])
-
-
 def test_a_head_whose_angles_tremble_is_named_and_turns_steadily_afterwards():
     steady, (cause,) = with_steady_head(rare.head_trembles(WHOLE, 6.0))
     assert cause.text == "the head's angles tremble by 6 deg"
     assert cause.is_mended
     assert len(scans_in(steady)) == len(scans_in(WHOLE))
-
-
-def test_a_head_whose_angles_do_not_tremble_is_left_as_it_is():
-    assert with_steady_head(WHOLE) == (WHOLE, [])
 
 
 @pytest.mark.parametrize("fault", [lambda one: broken.mount_turned(one, 120.0), broken.mount_upside_down])
@@ -146,12 +138,15 @@ def mapped():
     return {said: mapped_as(recording, "--set", "range_scale=1.02") for said, recording in recordings.items()}
 
 
+def assert_mended(trust, said):
+    assert f"mended: {said}" in trust.line
+    assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
+
+
 @pytest.mark.parametrize("said", FAULTS)
 def test_an_odometry_whose_axes_are_wrong_is_put_right_and_no_check_is_fine(mapped, said):
     found, right = mapped[said], mapped[FAULTS[said][0]]
-    trust = found.findings.trust
-    assert f"mended: {said}" in trust.line
-    assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
+    assert_mended(found.findings.trust, said)
     apart = (found.run.best - right.run.best)[:, :2]
     assert np.hypot(*(apart - apart[0]).T).max() < 1.0
 
@@ -163,9 +158,15 @@ def test_a_recording_that_is_mapped_anew_has_its_ranges_corrected_once(mapped, s
 
 
 def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
-    trust = mapped_as(broken.mount_turned(SHORT["ahead"], 120.0), "--fix-mount").findings.trust
-    assert {verdict.answer for verdict in trust.verdicts} <= {Answer.DOUBTFUL, Answer.NOT_MEASURED}
-    assert "mended: the sonar is turned by" in trust.line
+    found = mapped_as(broken.mount_turned(SHORT["ahead"], 120.0), "--fix-mount")
+    assert_mended(found.findings.trust, "the sonar is turned by")
+
+
+def live_causes(scans):
+    live = LiveCauses()
+    for scan in scans:
+        live.take(scan, scan.reference_pose)
+    return live
 
 
 @pytest.mark.parametrize(
@@ -177,9 +178,7 @@ def test_no_check_of_a_run_with_a_mount_from_the_echoes_is_fine():
     ],
 )
 def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(recording, said):
-    live = LiveCauses()
-    for scan in scans_in(recording):
-        live.take(scan, scan.reference_pose)
+    live = live_causes(scans_in(recording))
     live.look()
     assert [cause.text[: len(text)] for cause, text in zip(live.causes([]), said)] == said
     assert (np.trace(live.covariance([])) > 0.25) == bool(said)
@@ -188,9 +187,8 @@ def test_a_run_that_goes_on_names_its_causes_and_knows_its_place_less_with_them(
 
 
 def test_a_run_that_goes_on_names_a_head_that_stands_though_it_reports_that_it_turns():
-    live, stood = LiveCauses(), broken.head_stops(WHOLE, MIDDLE, np.inf, tells=False)
-    for scan in scans_in(stood):
-        live.take(scan, scan.reference_pose)
+    stood = broken.head_stops(WHOLE, MIDDLE, np.inf, tells=False)
+    live = live_causes(scans_in(stood))
     for beam in stood.sent:
         live.hear(beam)
     live.look()
@@ -220,9 +218,7 @@ def test_a_head_that_stands_for_all_of_the_newest_beams_is_known_by_those_before
 
 
 def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
-    live, scans = LiveCauses(), scans_in(broken.head_slips(WHOLE, 60.0, 30.0))
-    for scan in scans[:10]:
-        live.take(scan, scan.reference_pose)
+    live = live_causes(scans_in(broken.head_slips(WHOLE, 60.0, 30.0))[:10])
     live.look()
     for scan in scans_in(WHOLE):
         live.take(later(scan, SECONDS), scan.reference_pose)
@@ -241,12 +237,9 @@ def test_a_change_is_told_also_when_the_newest_scans_no_longer_show_it():
     ],
 )
 def test_a_run_that_goes_on_names_what_only_a_fit_of_its_newest_scans_shows(recording, scans, said):
-    localiser = LocaliserParameters().build_localiser(recording.sonar_in_base)
-    for scan in scans_in(recording)[:scans]:
-        localiser.take_scan(scan)
-    localiser.look_for_causes()
-    assert localiser.following.causes()[0].text.startswith(said)
-    assert np.trace(localiser.following.found.covariance([])) > 0.05
+    following = looked_at(recording, scans_in(recording)[:scans])
+    assert following.causes()[0].text.startswith(said)
+    assert np.trace(following.found.covariance([])) > 0.05
 
 
 @pytest.fixture(scope="module")
@@ -276,11 +269,8 @@ def test_a_run_that_goes_on_names_a_turned_sonar_from_three_deviations_of_its_co
 
 def test_a_compass_that_steps_with_the_positions_is_no_step_beside_right_ones():
     stepping = broken.compass_steps(WHOLE, 60.0, 28.0)
-    localiser = LocaliserParameters().build_localiser(stepping.sonar_in_base)
-    for scan in scans_in(stepping)[:12]:
-        localiser.take_scan(scan)
-    localiser.look_for_causes()
-    assert [cause.text for cause in localiser.following.causes()] == ["compass stepped by 28 deg"]
+    following = looked_at(stepping, scans_in(stepping)[:12])
+    assert [cause.text for cause in following.causes()] == ["compass stepped by 28 deg"]
 
 
 @pytest.mark.parametrize(("evidence", "looks"), [(10.0, 2), (100.0, 1)], ids=["weak", "strong"])

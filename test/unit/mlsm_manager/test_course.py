@@ -21,6 +21,12 @@ from mlsm_manager.self_check.course import (
 WHOLE = shortened(touring(), 200.0)
 
 
+def going(courses, yaw=0.0, seconds=10.0, metres=5.0):
+    """Return the path of a vehicle that looks along `yaw` [rad] and goes some metres along each of `courses` [rad]."""
+    places = metres * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
+    return Track(seconds * np.arange(len(courses)), np.column_stack([places, np.full(len(courses), yaw)]))
+
+
 @pytest.mark.long
 @pytest.mark.parametrize(("tour", "seconds"), [("turning", 600.0), ("harbour", 140.0)])
 def test_what_a_turned_dvl_hides_of_a_turned_sonar_is_stated(tour, seconds):
@@ -42,9 +48,7 @@ def test_a_sonar_is_turned_where_the_vehicle_never_goes_ahead(turn, named):
 
 @pytest.mark.parametrize(("stretches", "strafes"), [(9, False), (40, True)])
 def test_a_vehicle_strafes_only_where_it_was_seen_long_enough(stretches, strafes):
-    courses = np.linspace(0.0, 2.0 * np.pi, stretches)
-    places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
-    found = course_of(Track(10.0 * np.arange(stretches), np.column_stack([places, np.zeros(stretches)])))
+    found = course_of(going(np.linspace(0.0, 2.0 * np.pi, stretches)))
     assert (found.is_told, found.strafes) == (False, strafes)
 
 
@@ -53,29 +57,17 @@ def test_a_vehicle_strafes_only_where_it_was_seen_long_enough(stretches, strafes
     [(1, 0.9, False), (6, 0.9, True), (6, MOSTLY_ALONE, False), (9, MOSTLY_ALONE, True)],
 )
 def test_a_vehicle_that_often_goes_another_way_has_no_usual_course(others, mostly, strafes):
-    courses = np.radians([50.0] * (30 - others) + [15.0] * others)
-    places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
-    found = course_of(Track(10.0 * np.arange(30), np.column_stack([places, np.zeros(30)])), np.pi, mostly)
+    found = course_of(going(np.radians([50.0] * (30 - others) + [15.0] * others)), np.pi, mostly)
     assert (found.is_told, found.strafes) == (not strafes, strafes)
 
 
-@pytest.mark.parametrize(("seconds", "is_told"), [(50.0, False), (5.0, True)])
-def test_a_course_that_is_told_no_better_than_mounts_are_set_tells_nothing_of_the_mount(seconds, is_told):
+@pytest.mark.parametrize(("seconds", "turn", "is_told"), [(50.0, 0.0, False), (5.0, 0.0, True), (50.0, 120.0, True)])
+def test_a_course_tells_the_mount_only_better_than_mounts_are_set_unless_it_is_far_off(seconds, turn, is_told):
     """A vehicle that slips by up to 17 deg, every `seconds` to the other side."""
-    times = np.arange(0.0, 400.0)
-    course = np.radians(17.0) * np.sin(np.pi * times / seconds)
-    places = 0.5 * np.cumsum(np.column_stack([np.cos(course), np.sin(course)]), axis=0)
-    found = course_of(Track(times, np.column_stack([places, 0.0 * times])))
+    slipping = np.radians(17.0) * np.sin(np.pi * np.arange(400.0) / seconds)
+    found = course_of(going(slipping, np.radians(turn), 1.0, 0.5), np.pi)
+    assert np.degrees(found.turn) == pytest.approx(turn, abs=5.0)
     assert (found.is_told, found.strafes) == (is_told, False)
-
-
-def test_a_large_turn_is_told_however_vague_the_course_is():
-    times = np.arange(0.0, 400.0)
-    course = np.radians(17.0) * np.sin(np.pi * times / 50.0)
-    places = 0.5 * np.cumsum(np.column_stack([np.cos(course), np.sin(course)]), axis=0)
-    found = course_of(Track(times, np.column_stack([places, np.full(len(times), np.radians(120.0))])), np.pi)
-    assert np.degrees(found.turn) == pytest.approx(120.0, abs=5.0)
-    assert found.is_told
 
 
 @pytest.mark.parametrize(
@@ -95,13 +87,7 @@ def test_a_turn_that_was_told_holds_until_another_is_or_the_vehicle_strafes(now,
 def test_courses_that_last_tell_less_of_the_mount_than_as_many_that_change_at_once():
     lasting = np.repeat(np.radians([0.0, 9.0, -12.0, 4.0, 10.0, -7.0, -3.0]), 4)
     changing = lasting.reshape(7, 4).T.ravel()
-
-    def deviation(courses):
-        places = 5.0 * np.cumsum(np.column_stack([np.cos(courses), np.sin(courses)]), axis=0)
-        poses = np.vstack([np.zeros(3), np.column_stack([places, np.zeros(len(courses))])])
-        return course_of(Track(10.0 * np.arange(len(poses)), poses)).deviation
-
-    assert deviation(lasting) > 1.2 * deviation(changing)
+    assert course_of(going(lasting)).deviation > 1.2 * course_of(going(changing)).deviation
 
 
 def test_a_vehicle_that_goes_back_tells_nothing_of_the_mount_where_its_odometry_does():

@@ -1,5 +1,6 @@
 """map_bag as it is run: bags in, files, figures and one-line errors out."""
 
+import json
 import os
 import pty
 import re
@@ -14,8 +15,7 @@ import pytest
 import rosbag
 import yaml
 from heading_only import reduce_bag
-from map_bag_runs import refused, run, summary_of
-from programs import BASIN, ROOT
+from programs import BASIN, ROOT, run_program
 
 from mlsm_manager.self_check.verdict import RunAnswer
 from mlsm_manager.surface_map.map_file import Layer, read_map
@@ -34,6 +34,22 @@ FILES = {
 
 # The odometry is a DVL's: with AUTO the scale is unknown for the first of these few scans.
 CHECKED = ("--truth", "/ground_truth", "--refine", "--check", "--odometry", "dvl")
+
+
+def run(*arguments):
+    return run_program("map_bag", *arguments)
+
+
+def refused(*arguments):
+    """Return the one line with which map_bag refuses."""
+    done = run(*arguments)
+    lines = done.stderr.strip().splitlines()
+    assert (done.returncode, len(lines)) == (1, 1), done.stderr
+    return lines[0]
+
+
+def summary_of(folder):
+    return json.loads((folder / "summary.json").read_text())
 
 
 def command_for(folder):

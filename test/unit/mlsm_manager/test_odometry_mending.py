@@ -9,7 +9,7 @@ from made_recordings import SECONDS, touring, trembling
 from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.odometry.continuous import ContinuousOdometry
 from mlsm_manager.odometry.steps import MotionLimits, StepKind, impossible_steps
-from mlsm_manager.offline.mended_recording import with_odometry_mended
+from mlsm_manager.offline.heard_scans import with_odometry_mended
 from mlsm_manager.scan_matching.scan import Track
 from node_support.geometry import wrapped
 

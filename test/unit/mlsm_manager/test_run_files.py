@@ -156,32 +156,34 @@ def test_a_run_is_fine_only_if_all_was_measured_and_what_was_wrong_is_mended(ver
 
 
 def test_no_check_is_fine_of_a_path_that_was_only_assumed():
-    verdicts = [one.assuming("it was held still") for one in (FINE, SHORT)]
-    trust = replace(trust_of(*verdicts), assumed=Assumption("it was held still"))
-    assert [one.answer for one in verdicts] == [Answer.NOT_MEASURED] * 2
-    assert trust.line == "trust: NOT MEASURED: it was held still; nothing can be said of the position"
-    assert FIRING.assuming("it was held still") is FIRING
+    assert [one.assuming("it was turned").answer for one in (FINE, SHORT)] == [Answer.NOT_MEASURED] * 2
+    assert FIRING.assuming("it was turned") is FIRING
 
 
 @pytest.mark.parametrize(
-    ("if_so", "known"),
-    [(5.0, "position within 8.7 m if so"), (1.0, "position within 1.7 m if so, within 8.7 m if not")],
+    ("verdicts", "if_so", "line"),
+    [
+        ((FINE, SHORT), np.nan, "NOT MEASURED: it was turned; nothing can be said of the position"),
+        ((SHORT,), 1.0, "NOT MEASURED: it was turned; nothing can be said of the position"),
+        ((FINE, SHORT), 5.0, "NOT MEASURED: it was turned; position within 8.7 m if so"),
+        ((FINE, SHORT), 1.0, "NOT MEASURED: it was turned; position within 1.7 m if so, within 8.7 m if not"),
+        (
+            (FIRING,),
+            1.0,
+            "DOUBTFUL: too wide (2 m); at best position within 1.7 m if it was turned, within 8.7 m if not",
+        ),
+    ],
 )
-def test_of_an_odometry_that_was_put_right_is_said_how_well_the_position_is_known_if_that_is_so(if_so, known):
-    verdicts = [one.assuming("it was turned") for one in (FINE, SHORT)]
-    trust = replace(trust_of(*verdicts), assumed=Assumption("it was turned"), if_so=if_so)
-    assert trust.line == f"trust: NOT MEASURED: it was turned; {known}"
-    assert trust.uncertainty is not None
+def test_of_a_path_that_was_only_assumed_is_said_how_well_it_is_known_if_that_is_so(verdicts, if_so, line):
+    told = trust_of(*(one.assuming("it was turned") for one in verdicts))
+    trust = replace(told, assumed=Assumption("it was turned"), if_so=if_so)
+    assert trust.line == f"trust: {line}"
+    assert (trust.uncertainty is None) == line.endswith("nothing can be said of the position")
 
 
 def test_what_no_check_can_tell_is_said_last():
-    trust = replace(trust_of(FINE, matched=7), untold="nothing tells the north")
+    trust = replace(trust_of(FINE), untold="nothing tells the north")
     assert trust.line.endswith("nothing contradicts: position within 8.7 m; nothing tells the north")
-
-
-def test_where_something_else_is_wrong_the_line_tells_what_the_position_rests_on():
-    trust = replace(trust_of(FIRING), assumed=Assumption("the sonar's ranges are right"), if_so=1.0)
-    assert trust.line.endswith("; at best position within 1.7 m if the sonar's ranges are right, within 8.7 m if not")
 
 
 @pytest.mark.parametrize(("gone", "assumed"), [(20.0, NOTHING_ASSUMED), (80.0, LENGTHS)])
@@ -189,12 +191,6 @@ def test_lengths_that_nobody_measured_are_told_where_the_position_depends_on_the
     trust = trust_of(FINE).assuming(LENGTHS, np.array([[0.0, 0.0], [gone / 2.0, 0.0], [gone, 0.0]]))
     assert trust.assumed == assumed
     assert trust.deviations[-1] > trust_of(FINE).deviations[-1]
-
-
-def test_nothing_is_said_of_the_position_by_an_assumption_where_no_check_had_enough_data():
-    trust = replace(trust_of(SHORT.assuming("it was turned")), assumed=Assumption("it was turned"), if_so=1.0)
-    assert trust.line == "trust: NOT MEASURED: it was turned; nothing can be said of the position"
-    assert trust.uncertainty is None
 
 
 @pytest.mark.parametrize(("deviation", "stated"), [(0.5, np.sqrt(1.0 + 4.0)), (3.0, 3.0)])
@@ -208,8 +204,7 @@ def test_where_two_paths_are_possible_the_larger_deviation_from_the_one_that_is_
 
 def test_stretches_are_doubtful_where_a_check_fires():
     assert trust_of(FINE).doubtful.shape == (0, 2)
-    trust = trust_of(FINE, FIRING)
-    np.testing.assert_array_equal(trust.doubtful, [[3.0, 9.0]])
+    np.testing.assert_array_equal(trust_of(FINE, FIRING).doubtful, [[3.0, 9.0]])
 
 
 def test_what_it_cannot_tell_is_null_in_json():
@@ -225,24 +220,18 @@ SECONDS = np.arange(0.0, 11.0)
 AHEAD = np.column_stack([SECONDS, np.zeros(11)])
 
 
-def test_a_shifted_truth_is_no_error():
-    error = position_error(SECONDS, AHEAD, Truth(SECONDS, AHEAD + np.array([100.0, -50.0])))
-    assert (error["mean"], error["max"]) == (0.0, 0.0)
-
-
-def test_a_turned_truth_is_an_error():
-    error = position_error(SECONDS, AHEAD, Truth(SECONDS, AHEAD[:, ::-1]))
-    assert error["max"] == pytest.approx(10.0 * np.sqrt(2.0), abs=5e-4)
-
-
-def test_distances_count_at_the_stamps_of_the_truth():
-    error = position_error(SECONDS, AHEAD, Truth(np.array([0.0, 2.5, 7.5]), np.array([[0, 0], [2.5, 3], [7.5, 0]])))
-    assert error == {"mean": 1.0, "sd": 1.414, "max": 3.0}
-
-
-def test_the_truth_beyond_the_odometry_does_not_count():
-    late = Truth(np.array([5.0, 10.0, 20.0]), np.array([[5.0, 0.0], [10.0, 0.0], [99.0, 0.0]]))
-    assert position_error(SECONDS, AHEAD, late)["max"] == 0.0
+@pytest.mark.parametrize(
+    ("truth", "error"),
+    [
+        (Truth(SECONDS, AHEAD + np.array([100.0, -50.0])), (0.0, 0.0, 0.0)),
+        (Truth(SECONDS, AHEAD[:, ::-1]), (7.071, 4.472, 14.142)),
+        (Truth(np.array([0.0, 2.5, 7.5]), np.array([[0, 0], [2.5, 3], [7.5, 0]])), (1.0, 1.414, 3.0)),
+        (Truth(np.array([5.0, 10.0, 20.0]), np.array([[5.0, 0.0], [10.0, 0.0], [99.0, 0.0]])), (0.0, 0.0, 0.0)),
+    ],
+    ids=["shifted", "turned", "at its own stamps", "goes on beyond the odometry"],
+)
+def test_the_error_is_the_distance_from_the_truth_if_both_begin_at_one_place(truth, error):
+    assert position_error(SECONDS, AHEAD, truth) == dict(zip(("mean", "sd", "max"), error))
 
 
 def test_a_truth_of_another_time_is_refused():
