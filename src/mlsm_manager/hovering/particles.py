@@ -19,7 +19,8 @@ from mlsm_manager.surface_map.blocks import squares_of
 FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
 
 _SURFACE_WEIGHT = 0.4  # of a point on a surface: neighbours share errors
-# Of a post where an earlier one stood: in a simulated harbour 60 % lie within 1.5 m of one, on a wrong path 5 %.
+# Of a post where an earlier one stood. Of those heard on simulated tours of a basin 85 % lie within 1.5 m of an
+# earlier one where the path is true and 1 % where it is not; in a harbour 60 % and 5 %.
 _POST_WEIGHT = 3.0
 _POST_POWER = 0.5  # of their qualities: weak ones are heard again nearly as often as strong ones
 

@@ -9,12 +9,9 @@ import numpy as np
 from mlsm_manager.scan_matching.scan import MapCloud, Track
 from node_support.geometry import move_of, transformed
 
-PATH_POINTS = 17
-"""Points of the path within a scan: about one per second of a slow head's revolution."""
-_MOST_STRETCHES = 8
-"""A cloud comes within a scan or two of its own; eight turns of a head are two minutes."""
-_SLACK = 0.5
-"""s by which a cloud may reach beyond the scans that are known: a few beams, in which a vehicle moves decimetres."""
+PATH_POINTS = 17  # of the path within a scan: about one per second of a slow head's revolution
+_MOST_STRETCHES = 8  # a cloud comes within a scan or two of its own; eight turns of a head are two minutes
+_SLACK = 0.5  # s by which a cloud may reach beyond the known scans: a few beams, in which a vehicle moves decimetres
 
 
 class Placement(Protocol):

@@ -33,7 +33,8 @@ from node_support.geometry import composed, transformed
 _KNOWN_SCALE = 0.05  # deviation of the odometry's scale below which a place is known to about the cut of the solver
 _SURE = 0.5  # of an echo's deviation: a fix that is less sure says no more than the comparisons of the same echoes do
 _EXPECTED = 100.0  # m: where a place is expected less surely, or overflows after a bad odometry, nothing is searched
-# Of a run without reported positions: afterwards these may be reckoned from its own velocities, and prove nothing.
+# Of a run without reported positions, before it tells its velocity: a dead reckoning made from that changes the
+# positions that are reported, and proves nothing.
 _SCANS_BEFORE_VELOCITIES = 2
 
 
@@ -60,7 +61,7 @@ class Joint(Estimator):
         self, settings: MapSettings, errors: OdometryErrors, matcher: Matcher, sonar_in_base: Sequence[float],
         parameters: SolverParameters, without_positions: Optional[Assumed] = None,
     ) -> None:  # fmt: skip
-        """without_positions: assumed where the odometry turns out to report none; None where its kind was named."""
+        """`without_positions`: assumed where the odometry is found to report none; None where its kind was named."""
         self._usual, self._without_positions = Assumed(parameters, errors), without_positions
         super().__init__(settings, errors, matcher, sonar_in_base)
 
@@ -89,7 +90,10 @@ class Joint(Estimator):
 
     @property
     def target(self) -> BlockSource:
-        """Without the newest scan and those that lie apart: where the vehicle was put wrongly it would find itself."""
+        """The map in which a lost vehicle is searched: without the newest scan and those that lie apart.
+
+        Where the vehicle was put wrongly it would find itself.
+        """
         if self.session is None:
             return super().target
         before_newest = self.session.solver.log.node_times[-2]
@@ -97,7 +101,7 @@ class Joint(Estimator):
 
     @property
     def keyframes(self) -> Mapping[str, np.ndarray]:
-        """None without a run or after a long one."""
+        """What `restore` needs to go on with the present run, as arrays; none without a run or after a long one."""
         return {} if self.session is None else self._maps.stored(self.session)
 
     def restore(self, layers: Mapping[Layer, Blocks], keyframes: Mapping[str, np.ndarray]) -> str:

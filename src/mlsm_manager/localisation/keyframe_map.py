@@ -21,9 +21,11 @@ from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap, Overlay
 
 @dataclass(frozen=True)
 class MapSettings:
-    """resolution, match_resolution: side of a cell of the maps that are shown and matched with, m. limit: greatest
-    coordinate of a point, m. expected_blocks: to reserve memory for. carver: what marks free space and takes blocks
-    away that beams go through; None where that is not wanted.
+    """The grids of the map that is shown and of the map that is matched with.
+
+    resolution, match_resolution: side of a cell, m. limit: greatest coordinate of a point, m. expected_blocks: number
+    of blocks to reserve memory for.
+    carver: what marks free space and takes blocks away that beams go through; None where that is not wanted.
     """
 
     resolution: float
@@ -49,8 +51,9 @@ class KeyframeMap:
         most_followed: int = MOST_FOLLOWED,
         stretches: Optional[Stretches] = None,
     ) -> None:
-        """carver, most_followed: see KeyframeCarving. stretches: keeps settled keyframes for `redraw`; None for none.
-        The rest as MultiLevelSurfaceMap.
+        """`carver`: what marks free space and takes blocks away, None for nothing. most_followed: see KeyframeCarving.
+
+        stretches: what keeps settled keyframes for `redraw`; None for none. The rest as MultiLevelSurfaceMap.
         """
         self._map = MultiLevelSurfaceMap(resolution, limit, expected_blocks)
         self._free = KeyframeCarving(resolution, limit, carver, most_followed)
@@ -122,7 +125,13 @@ class KeyframeMap:
         self._overlay.take_off()
         carved = None
         while self._moving and self._moving[0].end <= settled_until:
-            report = self._settle_oldest(placement)
+            cloud = self._moving.popleft()
+            self._free.forget_oldest()
+            points, origins = placement.heard(cloud)
+            self._map.insert(points)
+            if self._stretches is not None:
+                self._stretches.add(cloud.end, points, placement, len(self._map))
+            report = self._carved(points, cloud.times, origins)
             carved = report if carved is None else carved + report
         if self._moving:
             self._due = placement
@@ -158,16 +167,6 @@ class KeyframeMap:
             if cloud.end <= time:
                 copy.insert(placement.heard(cloud)[0])
         return copy
-
-    def _settle_oldest(self, placement: Placement) -> Optional[CarveReport]:
-        """Draw the oldest keyframe for ever, and return what it carved; None where nothing is to be carved."""
-        cloud = self._moving.popleft()
-        self._free.forget_oldest()
-        points, origins = placement.heard(cloud)
-        self._map.insert(points)
-        if self._stretches is not None:
-            self._stretches.add(cloud.end, points, placement, len(self._map))
-        return self._carved(points, cloud.times, origins)
 
     def _draw_what_is_due(self) -> None:
         if self._due is None:

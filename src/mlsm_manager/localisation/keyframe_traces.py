@@ -21,10 +21,10 @@ from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap, Overlay
 from mlsm_manager.surface_map.operations import LevelTransform, moved
 from node_support.geometry import move_of
 
-_STRAYED = 0.5  # of a cell, by which a keyframe must have moved since its beams were followed: less changes little
+_STRAYED = 0.5  # of a cell, by which a keyframe must have moved to be followed anew: less changes few free cells
 MOST_FOLLOWED = 2
-"""The beams of so many moving keyframes are followed with each scan, those that moved farthest: more would take over a
-fifth of its time. What settles is followed in any case."""
+"""The beams of so many moving keyframes are followed with each scan: those that moved farthest, and a new one before
+them. More would take over a fifth of the time of a scan. What settles is followed in any case."""
 
 Beams = Tuple[np.ndarray, np.ndarray, np.ndarray]
 """Of a keyframe: points (n, 4) in map, the times (n,) [s] of their beams, and where the sonar was then, (n, 2) m."""

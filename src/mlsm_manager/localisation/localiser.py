@@ -28,10 +28,12 @@ from mlsm_manager.surface_map.map_file import Layer, StoredMap
 from node_support.errors import RefusedInput
 from node_support.geometry import composed, move_of
 
-_JUMP_BACK = 30.0  # s: scans and odometry can overtake each other by seconds; a restarted bag jumps by more
+# s: scans and odometry take different paths and can overtake each other by seconds; a restarted bag jumps by more.
+_JUMP_BACK = 30.0
 _LEAP = 600.0  # s: by more an odometry that goes on leaps only where its clock does
 _SAME_BEGIN = 60.0  # s: two playbacks of a recording begin within a turn or two of the head
-# s: before the three minutes that tf keeps are over; scans of a fast playback on a busy machine are late by one.
+# s: tf keeps three minutes of odometry, and the belief must be predicted from it before they are over; but not so soon
+# that scans of a fast playback on a busy machine, which are late by a minute, come after it.
 _LONGEST_SILENCE = 120.0
 _TURNS_COMPARED = 40  # turns of the head in which causes are looked for: ten minutes
 _NEWEST = 3  # scans in which a vehicle is searched on request; two must be found
@@ -174,7 +176,10 @@ class Localiser:
         return composed(self.estimator.correction, self.following.odometry.fixes(np.array(np.inf)))
 
     def place_now(self, time: float, odometry: np.ndarray) -> Optional[PlaceNow]:
-        """See Following.place_at."""
+        """Return how old and how good the position is at `time` [s], when the odometry says T_odom_base (3,).
+
+        None before the first fix.
+        """
         with self._lock:
             belief = self.estimator.belief
             return None if belief is None else self.following.place_at(time, odometry, belief, self.estimator.errors)

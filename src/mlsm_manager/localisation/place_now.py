@@ -25,8 +25,9 @@ class PositionState(IntEnum):
 
 class PlaceNow(NamedTuple):
     """time: s, of what is told. age: s since the end of the scan of the newest fix. overdue: s since two more should
-    have come. covariance: (3, 3) of the pose now, with what causes add to it. fixes: how many there were. by_mounts: m,
-    of the deviation, by the sonar's yaw where nothing tells it, which turns map and place alike.
+    have come. covariance: (3, 3) of the pose, propagated to now by the odometry's errors, with what causes add to it.
+    fixes: how many there were. by_mounts: m, of the deviation, by the sonar's yaw where nothing tells it: it turns map
+    and place alike, so that the place in the map is known.
     """
 
     time: float

@@ -19,7 +19,8 @@ from mlsm_manager.surface_map.mlsm import Covered, MultiLevelSurfaceMap
 from node_support.errors import RefusedInput
 from node_support.geometry import seen_from
 
-_STRAYED = np.array([1.0, 1.0, 0.1])  # m, rad: by which a vehicle may have left the stored correction in a restart
+# m and rad that a vehicle may have strayed from the stored correction while nobody watched: some seconds of a restart.
+_STRAYED = np.array([1.0, 1.0, 0.1])
 _LONGEST_BRIDGE = 30.0  # s: in one or two turns of a head a vehicle hardly leaves a straight line
 # In simulated tours and a marina 0.85 to 1 of a scan lie on the map where the vehicle is, and the two agree by 0.44 to
 # 0.98; of scans 5 m or more aside that agree by 0.4 with the map, 0.81 at most lie on it.
@@ -57,8 +58,8 @@ class StoredPlace:
     def bridged(self, track: Track) -> Track:
         """Return a track that goes straight from here to its beginning, where that is some seconds later.
 
-        A node that is started again within a scan has no odometry of the seconds before: on a straight line from where
-        it was saved the echoes of those seconds lie better than without any.
+        A node that is started again within a scan has no odometry of the seconds before. Where it was when it was saved
+        is known, and with the odometry along a straight line the echoes of those seconds lie better than without any.
         """
         if not 0.0 < track.times[0] - self.belief.time < _LONGEST_BRIDGE:
             return track
@@ -77,8 +78,10 @@ class StoredPlace:
 @dataclass(frozen=True)
 class StoredRun:
     """T_map_odom: (3,) that moves the scans before they are solved. sonar_in_base: (2,) m. scans: all, oldest first.
-    solver: see LiveSolver. clouds: of the map that is shown, whose places may still change. shown, matched: what both
-    maps hold without such keyframes, where these lie.
+
+    solver: see LiveSolver.
+    clouds: of the map that is shown, whose places may still change. shown, matched: what both maps hold without such
+    keyframes, where these lie.
     """
 
     T_map_odom: np.ndarray
@@ -104,10 +107,23 @@ class StoredRun:
     @staticmethod
     def of_arrays(arrays: Mapping[str, np.ndarray]) -> "Optional[StoredRun]":
         """Return what `arrays` gave; None where they hold no run. Whether `solver` is whole shows when it is used."""
+        arrays = _under(_PREFIX, arrays)
         try:
-            return _run_of(_under(_PREFIX, arrays))
+            scans, clouds = unstacked(Scan, arrays, "scan."), unstacked(MapCloud, arrays, "cloud.")
+            shown, matched = unstacked(Covered, arrays, "covered.")
+            T_map_odom, sonar_in_base = arrays["T_map_odom"], arrays["sonar_in_base"]
         except (KeyError, ValueError, IndexError, RefusedInput):
             return None
+        fits = [len(scans) > 0, T_map_odom.shape == (3,), sonar_in_base.shape == (2,)]
+        fits += [cloud.points.shape == (len(cloud.times), 4) for cloud in clouds]
+        for covered in (shown, matched):
+            fits.append(covered.cells.shape == (len(covered.cells), 2))
+            fits.append(covered.rows.shape == (len(covered.crossed), ROW_WIDTH))
+        fits += [np.isfinite(each).all() for each in (T_map_odom, sonar_in_base, shown.rows, matched.rows)]
+        if not all(fits):
+            return None
+        scans = [replace(scan, moving=scan.moving.astype(bool)) for scan in scans]
+        return StoredRun(T_map_odom, sonar_in_base, scans, _under(_SOLVER, arrays), clouds, shown, matched)
 
 
 def resumed_if_it_fits(session: JointSession, scan: Scan, surface_map: MultiLevelSurfaceMap) -> Optional[JointSession]:
@@ -130,24 +146,3 @@ def resumed_if_it_fits(session: JointSession, scan: Scan, surface_map: MultiLeve
 
 def _under(prefix: str, arrays: Mapping[str, np.ndarray]) -> Dict[str, np.ndarray]:
     return {name[len(prefix) :]: array for name, array in arrays.items() if name.startswith(prefix)}
-
-
-def _run_of(arrays: Mapping[str, np.ndarray]) -> StoredRun:
-    scans, clouds = unstacked(Scan, arrays, "scan."), unstacked(MapCloud, arrays, "cloud.")
-    shown, matched = unstacked(Covered, arrays, "covered.")
-    if not scans:
-        raise ValueError("no scans")
-    for cloud in clouds:
-        if cloud.points.shape != (len(cloud.times), 4):
-            raise ValueError(f"a cloud of points {cloud.points.shape}, times {cloud.times.shape}")
-    for name, size in (("T_map_odom", 3), ("sonar_in_base", 2)):
-        if arrays[name].shape != (size,) or not np.isfinite(arrays[name]).all():
-            raise ValueError(f"{name} {arrays[name]}")
-    for covered in (shown, matched):
-        cells, rows = covered.cells, covered.rows
-        is_whole = cells.shape == (len(cells), 2) and rows.shape == (len(covered.crossed), ROW_WIDTH)
-        if not is_whole or not np.isfinite(rows).all():
-            raise ValueError(f"cells {cells.shape}, blocks {rows.shape}")
-    scans = [replace(scan, moving=scan.moving.astype(bool)) for scan in scans]
-    solver = _under(_SOLVER, arrays)
-    return StoredRun(arrays["T_map_odom"], arrays["sonar_in_base"], scans, solver, clouds, shown, matched)

@@ -41,9 +41,11 @@ class ScanUpdate:
 
 @dataclass(frozen=True)
 class CloudUpdate:
-    """report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that
-    were not inserted because the scan of their time was rejected. carved: what its beams said about free space, None
-    where nobody asked or the vehicle's position is not known.
+    """What was done with a cloud.
+
+    report: of the insertion. waiting: whether it waits for the match of its time. unplaced: number of points that were
+    not inserted because the scan of their time was rejected.
+    carved: what its beams said about free space, None where nobody asked or the vehicle's position is not known.
     """
 
     report: InsertReport

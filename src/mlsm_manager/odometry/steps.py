@@ -135,7 +135,9 @@ _AS_BEFORE = 0.5  # share of that speed that the last step before a stall has, a
 
 class Stall(NamedTuple):
     """begin, end: of the poses, the first that stood and the first after it. missed, usual: (3,) in base_link, how the
-    vehicle went meanwhile, and in a step as long as the last one, if it went on as before. lost: s, as of a Step.
+    vehicle went meanwhile, and in a step as long as the last one, if it went on as before. kind: STALLED where the
+    heading stood too, else POSITIONS; HELD or HUNG where it jumped afterwards. lost: s, in which nothing tells how the
+    vehicle went.
     """
 
     begin: int

@@ -56,13 +56,16 @@ def octomap_message(tree: Any, octomap_header: Header) -> Any:
 
 
 class _WholeMap(rospy.SubscribeListener):
-    """A topic that carries the whole map in each message: built only for those who listen, and not all the time."""
+    """A topic that carries the whole map in each message: built only for those who listen, and not all the time.
+
+    is_due: whether the map changed since it was sent.
+    """
 
     def __init__(self, topic: str, kind: Any, build: Callable[[], Any], localiser: Localiser, health: Health) -> None:
         self._build = build
         self._localiser = localiser
         self._next = 0.0
-        self._is_due = False
+        self.is_due = False
         self._guarded = guarded(health, self._send)
         self._publisher = rospy.Publisher(topic, kind, subscriber_listener=self, queue_size=2)
 
@@ -71,15 +74,12 @@ class _WholeMap(rospy.SubscribeListener):
         if self._localiser.block_count:
             self._guarded(peer_publish)
 
-    def change(self) -> None:
-        self._is_due = True
-
     def publish_if_due(self) -> None:
         """Send the map if it changed, somebody listens, and the last time is long enough ago."""
         start = time.monotonic()
-        if not self._is_due or start < self._next or not self._publisher.get_num_connections():
+        if not self.is_due or start < self._next or not self._publisher.get_num_connections():
             return
-        self._is_due = False
+        self.is_due = False
         self._guarded(self._publisher.publish)
         self._next = time.monotonic() + (time.monotonic() - start) / _MOST_TIME
 
@@ -92,31 +92,30 @@ class _WholeMap(rospy.SubscribeListener):
 
 
 class _Tiles(rospy.SubscribeListener):
-    """MLSM/Markers: the tiles that changed, and the whole map to who comes."""
+    """MLSM/Markers: the tiles that changed, and the whole map to who comes.
+
+    is_replaced: whether the next message deletes what is shown of another map.
+    """
 
     def __init__(self, parameters: MlsmCoreParameters, localiser: Localiser, health: Health) -> None:
         self._localiser = localiser
         self._frame = parameters.map_frame
         self._markers = BlockMarkers(parameters.color_by)
         self._lock = threading.Lock()
-        self._is_replaced = True
+        self.is_replaced = True
         self._send_all = guarded(health, self._again)
         self._publisher = rospy.Publisher(topics.MAP_MARKERS, MarkerArray, subscriber_listener=self, queue_size=10)
 
     def peer_subscribe(self, _topic: str, _publish: Callable[[Any], None], peer_publish: Callable[[Any], None]) -> None:
         self._send_all(peer_publish)
 
-    def replace(self) -> None:
-        """Delete what is shown of another map with the next message."""
-        self._is_replaced = True
-
     def publish_if_changed(self) -> None:
         if not self._publisher.get_num_connections():
             return
         with self._lock:
             tiles, blocks = self._localiser.changed_tiles()
-            if self._is_replaced or self._markers.is_outgrown(blocks):
-                self._is_replaced = False
+            if self.is_replaced or self._markers.is_outgrown(blocks):
+                self.is_replaced = False
                 self._publisher.publish(self._markers.whole(self._localiser.blocks, header(0, self._frame)))
             elif len(tiles):
                 changed = self._markers.changed(blocks, map(tuple, tiles.tolist()), header(0, self._frame))
@@ -156,12 +155,12 @@ class MapPublisher:
         if stamp_ns is not None:
             self._stamp_ns = stamp_ns
         for topic in self._whole:
-            topic.change()
+            topic.is_due = True
         self._tell()
 
     def replace(self) -> None:
         """Publish soon, because there is another map now."""
-        self._tiles.replace()
+        self._tiles.is_replaced = True
         self.change()
 
     def _publish(self) -> None:

@@ -6,7 +6,6 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan import Track
 from node_support.errors import RefusedInput
-from node_support.headers import DAY
 from node_support.health import Health
 from node_support.ros.transforms import TfBuffer, stamp_of
 
@@ -18,7 +17,7 @@ _STEADY = 65  # times of a track besides those of the beams: four a second in a 
 class OdometryTrack:
     """Looks up odom -> base_link at many times; `tf`: where. name: as which its silence is told."""
 
-    def __init__(self, odom_frame: str, base_frame: str, health: Health, stamp_tolerance: float = DAY) -> None:
+    def __init__(self, odom_frame: str, base_frame: str, health: Health, stamp_tolerance: float) -> None:
         """`stamp_tolerance`: how far stamps may be from odometry and clock, s."""
         self._frames = odom_frame, base_frame
         self.name = f"tf of {odom_frame} -> {base_frame}"
