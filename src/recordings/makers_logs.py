@@ -37,11 +37,8 @@ def is_makers_log(path: Path) -> bool:
 
 
 def makers_beams(path: Path) -> RecordedBeams:
-    """Return the beams of a log, in the frame "sonar". Raises RecordingError."""
-    reader = _reader(path)
-    if reader is None:
-        raise RecordingError(f"{path}: not a log of a known sonar: neither a .852 file nor a log of Ping Viewer")
-    return reader(path)
+    """Return the beams of a log that is read here, in the frame "sonar". Raises RecordingError."""
+    return _reader(path)(path)
 
 
 def _reader(path: Path) -> Optional[_Reader]:

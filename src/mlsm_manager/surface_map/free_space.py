@@ -1,14 +1,11 @@
 """Carves free space (thesis 6.2.1, type FREE) out of what is unknown, and takes blocks away that beams go through.
 
-What a beam says. Its first echo says that nothing nearer, in the whole fan, echoes strongly enough to be heard.
-Sideways the fan is narrow (2.5 deg) and says where free space is. In height it is wide (22 deg: 8 m at 20 m), so that
-"free" is a statement about the plane in which the vehicle moves and not about what lies above or below it. A crossed
-cell is therefore noted free at the height of the beam's axis only, while a block speaks against a beam, and the beam
-against the block, when it lies in the inner part of the fan, where echoes are loud.
+A first echo says that nothing nearer, in the whole fan, is loud enough to be heard. Sideways the fan is narrow (2.5
+deg), in height it is wide (22 deg: 8 m at 20 m). So a crossed cell is free at the height of the beam's axis only, and a
+block and a beam speak against each other in the inner part of the fan only, where echoes are loud.
 
-What is kept. Of each block how many points fell into it and how many beams crossed it since the last of them did.
-Counts and not log-odds: they do not depend on the order of beams within a scan, need no limits to stay able to change,
-and add up when maps are merged.
+Kept are how many points fell into a block and how many beams crossed it since, not log-odds: counts do not depend on
+the order of beams within a scan, need no limits to stay able to change, and add up when maps are merged.
 """
 
 from dataclasses import dataclass

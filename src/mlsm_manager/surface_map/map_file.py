@@ -78,6 +78,10 @@ class StoredMap:
         """The blocks that tools show and export; those of the matched layer where there are no others."""
         return self.layers.get(Layer.SHOWN, self.layers.get(Layer.MATCHED, Blocks.none(1.0)))
 
+    @property
+    def free(self) -> Blocks:
+        return self.layers.get(Layer.FREE, Blocks.none(self.shown.resolution))
+
 
 def write_map(path: Path, stored: StoredMap) -> None:
     """Write the map whole or not at all; raises OSError."""

@@ -4,7 +4,7 @@ import threading
 from argparse import Namespace
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Dict, List, Sequence, Union
+from typing import Any, List, Union
 
 import genpy
 import rosbag
@@ -66,17 +66,14 @@ class BagPlayer:
         self.health = make_health("play_bag")
         self._messages = read_messages(options)
         self._clock = rospy.Publisher(topics.CLOCK, Clock, queue_size=_QUEUE_SIZE)
-        self._publishers = self._advertised()
-        self._ended = threading.Event()
-        rospy.on_shutdown(self._ended.set)
-        threading.Thread(target=guarded(self.health, self._play), daemon=True).start()
-
-    def _advertised(self) -> Dict[str, rospy.Publisher]:
         kinds = {played.topic: type(played.message) for played in self._messages}
-        return {
+        self._publishers = {
             topic: rospy.Publisher(topic, kind, queue_size=_QUEUE_SIZE, latch=topic == topics.STATIC_TRANSFORMS)
             for topic, kind in kinds.items()
         }
+        self._ended = threading.Event()
+        rospy.on_shutdown(self._ended.set)
+        threading.Thread(target=guarded(self.health, self._play), daemon=True).start()
 
     def _play(self) -> None:
         self._wait_for_subscribers()
@@ -141,21 +138,16 @@ def read_messages(options: Namespace) -> List[Played]:
         raise StartError(f"{options.bag}: not a bag, or damaged: {error}") from None
     if not played:
         raise StartError(f"{options.bag}: no message on {' '.join(options.topics or ['any topic'])}")
-    if options.ned:
-        _turn_all_up(played, options)
+    turned = [options.ned and turn_up(one.message, options.odom_frame, options.base_frame) for one in played]
+    if options.ned and not any(turned):
+        link = f"{options.odom_frame} -> {options.base_frame}"
+        raise StartError(f"{options.bag}: --ned turns the pose {link}, which is neither in tf nor in an Odometry")
     return sorted(played, key=lambda one: one.time)
 
 
 def _messages(bag: rosbag.Bag, topic: str) -> List[Played]:
     # One topic at a time: rosbag keeps one decompressed chunk, and topics often lie in chunks of their own.
     return [Played(time.to_sec(), topic, message) for _, message, time in bag.read_messages(topics=[topic])]
-
-
-def _turn_all_up(played: Sequence[Played], options: Namespace) -> None:
-    turned = [turn_up(one.message, options.odom_frame, options.base_frame) for one in played]
-    if not any(turned):
-        link = f"{options.odom_frame} -> {options.base_frame}"
-        raise StartError(f"{options.bag}: --ned turns the pose {link}, which is neither in tf nor in an Odometry")
 
 
 def turn_up(message: Any, odom_frame: str, base_frame: str) -> bool:

@@ -1,17 +1,16 @@
 """Maps in the formats of other programs: the ending of a file's name says which."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Callable, Dict, Optional, Tuple
+from typing import Any, Callable, Dict, Tuple
 
 import numpy as np
 
-from georeferencing.origin import Origin
 from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.export.charts import write_geotiff
 from mlsm_manager.surface_map.export.pictures import ColorBy, write_picture
 from mlsm_manager.surface_map.export.rasters import elevation, occupancy, write_ascii_grid, write_map_server
-from mlsm_manager.surface_map.map_file import ENDING, ExportError, Layer, StoredMap, write_map
+from mlsm_manager.surface_map.map_file import ENDING, ExportError, StoredMap, write_map
 from node_support.errors import needed
 from node_support.files import whole_file, write_whole
 from node_support.geometry import members
@@ -65,30 +64,29 @@ def write_pcd(path: Path, blocks: Blocks) -> None:
 @dataclass(frozen=True)
 class ExportOptions:
     """low, high: m, of the slice that a 2-D occupancy grid shows. color_by: of a picture. crs: of a GeoTIFF, such as
-    EPSG:25831; the one that suits where it is empty. origin: where the map lies, where that is known.
+    EPSG:25831; the one that suits where it is empty.
     """
 
     low: float = -np.inf
     high: float = np.inf
     color_by: ColorBy = ColorBy.HEIGHT
     crs: str = ""
-    origin: Optional[Origin] = None
 
 
-_Writer = Callable[[Path, Blocks, Blocks, ExportOptions], None]
-_WRITERS: Dict[str, _Writer] = {
-    ".ply": lambda path, blocks, free, options: write_ply(path, blocks),
-    ".pcd": lambda path, blocks, free, options: write_pcd(path, blocks),
-    ".bt": lambda path, blocks, free, options: write_octree(path, blocks, free),
-    ".ot": lambda path, blocks, free, options: write_octree(path, blocks, free),
-    ".pgm": lambda path, blocks, free, options: write_map_server(
-        path, occupancy(blocks, free, options.low, options.high)
+_WRITERS: Dict[str, Callable[[Path, StoredMap, ExportOptions], None]] = {
+    ".ply": lambda path, stored, _: write_ply(path, stored.shown),
+    ".pcd": lambda path, stored, _: write_pcd(path, stored.shown),
+    ".bt": lambda path, stored, _: write_octree(path, stored.shown, stored.free),
+    ".ot": lambda path, stored, _: write_octree(path, stored.shown, stored.free),
+    ".pgm": lambda path, stored, options: write_map_server(
+        path, occupancy(stored.shown, stored.free, options.low, options.high)
     ),
-    GEOTIFF: lambda path, blocks, free, options: write_geotiff(path, blocks, options.origin, options.crs),
-    ".asc": lambda path, blocks, free, options: write_ascii_grid(path, elevation(blocks)),
-    ".png": lambda path, blocks, free, options: write_picture(path, blocks, free, options.color_by),
+    GEOTIFF: lambda path, stored, options: write_geotiff(path, stored.shown, stored.origin, options.crs),
+    ".asc": lambda path, stored, _: write_ascii_grid(path, elevation(stored.shown)),
+    ".png": lambda path, stored, options: write_picture(path, stored.shown, stored.free, options.color_by),
+    ENDING: lambda path, stored, _: write_map(path, stored),
 }
-ENDINGS = (*_WRITERS, ENDING)
+ENDINGS = tuple(_WRITERS)
 
 
 def export(stored: StoredMap, path: Path, options: ExportOptions) -> None:
@@ -99,14 +97,9 @@ def export(stored: StoredMap, path: Path, options: ExportOptions) -> None:
     """
     if path.suffix not in ENDINGS:
         raise ExportError(f"{path}: must end with one of {' '.join(ENDINGS)}")
-    if path.suffix == ENDING:
-        write_map(path, stored)
-        return
-    if not len(stored):
+    if path.suffix != ENDING and not len(stored):
         raise ExportError("the map has no blocks")
-    blocks = stored.shown
-    free = stored.layers.get(Layer.FREE, Blocks.none(blocks.resolution))
-    _WRITERS[path.suffix](path, blocks, free, replace(options, origin=stored.origin))
+    _WRITERS[path.suffix](path, stored, options)
 
 
 _HIT, _MISS = 0.85, -0.4  # log-odds of one hit and one miss, OctoMap's own (probabilities 0.7 and 0.4)

@@ -78,7 +78,7 @@ def ramp(shares: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(shares, places, _RAMP[:, channel]) for channel in range(3)])
 
 
-def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy = ColorBy.HEIGHT) -> None:
+def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy) -> None:
     """Write a PNG of the highest block of each cell on what is free, y up, with what its colours mean.
 
     Where the map is flat, its heights are rounding, and the number of points is shown instead. Raises ExportError and
