@@ -62,20 +62,20 @@ class CellIndex:
         """
         most = _MOST_LOAD * len(self.keys)
         if self._used + len(keys) > most:
-            cells = self._used + np.count_nonzero(_found(keys, self.keys) < 0)
+            cells = self._used + _placed(keys, self.keys, False)[1]
             if cells > most:
                 taken = self.keys != _EMPTY
                 held_keys, heads = self.keys[taken], self.heads[taken]
                 self._begin(cells)
-                held_places, self._used = _placed(held_keys, self.keys)
+                held_places, self._used = _placed(held_keys, self.keys, True)
                 self.heads[held_places] = heads
-        places, new = _placed(keys, self.keys)
+        places, new = _placed(keys, self.keys, True)
         self._used += new
         return places
 
     def find(self, keys: np.ndarray) -> np.ndarray:
         """Return (n,) int32 `heads` of the cells with `keys` (n,), NO_BLOCK where there is none; makes none."""
-        places = _found(np.ascontiguousarray(keys), self.keys)
+        places, _ = _placed(np.ascontiguousarray(keys), self.keys, False)
         return np.where(places >= 0, self.heads[places], np.int32(NO_BLOCK))
 
 
@@ -93,25 +93,18 @@ def _searched(key, held_keys):
 
 
 @compiled()
-def _found(keys, held_keys):
-    """Return (n,) the places of `keys` (n,), -1 of those that are not there."""
-    places = np.empty(len(keys), np.int64)
-    for number in range(len(keys)):
-        place = _searched(keys[number], held_keys)
-        places[number] = place if held_keys[place] != _EMPTY else -1
-    return places
-
-
-@compiled()
-def _placed(keys, held_keys):
-    """Return (n,) the places of `keys` (n,), and how many of these are new and took one."""
+def _placed(keys, held_keys, takes_new):
+    """Return (n,) the places of `keys` (n,), and how many of these are new: they take one where asked to, -1 if not."""
     places, new = np.empty(len(keys), np.int64), 0
     for number in range(len(keys)):
         place = _searched(keys[number], held_keys)
-        if held_keys[place] == _EMPTY:
-            held_keys[place] = keys[number]
-            new += 1
         places[number] = place
+        if held_keys[place] == _EMPTY:
+            new += 1
+            if takes_new:
+                held_keys[place] = keys[number]
+            else:
+                places[number] = -1
     return places, new
 
 
@@ -234,7 +227,7 @@ def _longer(array: np.ndarray, length: int) -> np.ndarray:
 def _write(runs, changed, held, slots):
     """Write Runs, which all have rows, into the chains of the cells at `slots` (c,).
 
-    runs: their members without the last, which is `changed`. held: the store's arrays.
+    runs: their members without `changed`. held: the store's arrays.
     """
     (blocks, run_rows, cells, run_crossed), (rows, following, crossed, heads) = runs, held
     for run in range(len(run_rows)):

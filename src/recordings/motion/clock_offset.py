@@ -64,7 +64,9 @@ def clock_offset(beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray) 
     Looked for are offsets of up to ten minutes, and where the two have no time in common those around all that let
     one lie in the other. Raises RecordingError where the echoes do not tell.
     """
-    echoes, way = _echoes(beams, T_base_sonar), _way(track)
+    echoes, turns = _echoes(beams, T_base_sonar), rotation_matrices(track.rotations)
+    yaws = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
+    way = _Way(track.stamps_ns * 1e-9, np.column_stack([track.translations[:, :2], yaws]))
     offsets = _candidates(echoes, way)
     scores = np.array([_meeting(way.placed(echoes, offset), echoes.turn) for offset in offsets])
     clearness = _clearness(scores)
@@ -116,12 +118,6 @@ def _echoes(beams: List[Beam], T_base_sonar: np.ndarray) -> _Echoes:
         )
     turn = np.repeat(np.arange(len(points)), [len(one) for one in points])
     return _Echoes(np.concatenate(points), np.concatenate(times), turn)
-
-
-def _way(track: PoseTrack) -> _Way:
-    turns = rotation_matrices(track.rotations)
-    yaws = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
-    return _Way(track.stamps_ns * 1e-9, np.column_stack([track.translations[:, :2], yaws]))
 
 
 def _candidates(echoes: _Echoes, way: _Way) -> np.ndarray:

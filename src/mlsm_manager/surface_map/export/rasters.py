@@ -98,7 +98,7 @@ _ROUND = 0.3  # of the bend across: what bends as much along is a heap, not a ba
 _FAINT, _NEAR = 0.35, 13  # of the most points within so many cells: at the rim of a heap noise makes rays
 _REACH = 0.6  # cells from a cell's middle to the ridge that goes through it
 _HALF = 0.6  # cells, of a line: neighbours touch
-_FEWEST = 3  # cells in a row: fewer are no surface
+_FEWEST = 3  # cells in a chain of a ridge: fewer are no surface
 _MOST_CELLS_OF_RIDGES = 16_000_000  # of the raster: with more, several cells are taken as one
 _MARGIN = 4  # cells around the map, so that its rim is no edge
 
@@ -123,7 +123,8 @@ def ridges(blocks: Blocks) -> np.ndarray:
     is_ridge &= smooth > _FAINT * maximum_filter(smooth, _NEAR)
     is_ridge &= middle_bend + spread > _ROUND * sharpest
     is_ridge &= np.maximum(np.abs(ahead * x), np.abs(ahead * y)) <= _REACH
-    rows, columns = np.nonzero(is_ridge & _in_rows(is_ridge))
+    chains, _ = label(is_ridge, structure=np.ones((3, 3)))
+    rows, columns = np.nonzero(is_ridge & (np.bincount(chains.ravel())[chains] >= _FEWEST))
     ahead, x, y = ahead[rows, columns], x[rows, columns], y[rows, columns]
     middle = np.column_stack([columns + 0.5 + ahead * x, rows + 0.5 + ahead * y])
     along = _HALF * np.column_stack([-y, x])
@@ -143,9 +144,3 @@ def counts(blocks: Blocks) -> Tuple[np.ndarray, np.ndarray, float]:
     numbers = np.zeros((rows, columns), dtype=np.float32)
     np.add.at(numbers, tuple((cells - low).T[::-1]), blocks.count)
     return numbers, low, together * blocks.resolution
-
-
-def _in_rows(is_ridge: np.ndarray) -> np.ndarray:
-    """Return which cells lie in a chain of enough cells of a ridge."""
-    chains, _ = label(is_ridge, structure=np.ones((3, 3)))
-    return np.bincount(chains.ravel())[chains] >= _FEWEST
