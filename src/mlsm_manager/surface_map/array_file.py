@@ -49,21 +49,21 @@ def encoded(words: Mapping[str, Any], arrays: Mapping[str, np.ndarray]) -> bytes
 
 def decoded(data: bytes) -> Tuple[Dict[str, Any], Dict[str, np.ndarray]]:
     """Return words and arrays of what `encoded` made. Raises ArrayFileError for any other bytes."""
-    header, body = _checked(data)
+    length, content = _checked(data)
     try:
-        words, entries = header["words"], header["arrays"]
-        arrays = {}
-        for entry in entries:
+        header, body = json.loads(bytes(content[:length]).decode()), content[length:]
+        words, arrays = dict(header["words"]), {}
+        for entry in header["arrays"]:
             arrays[entry["name"]], body = _array(entry, body)
-    except (KeyError, TypeError, ValueError, AttributeError, OverflowError, zlib.error) as error:
+    except (LookupError, TypeError, ValueError, AttributeError, OverflowError, RecursionError, zlib.error) as error:
         raise ArrayFileError(f"its header does not fit its content ({error})") from None
-    if len(body) or not isinstance(words, dict):
+    if len(body):
         raise ArrayFileError(f"{len(body)} bytes more than its header tells of")
     return words, arrays
 
 
-def _checked(data: bytes) -> Tuple[Dict[str, Any], memoryview]:
-    """Return the header and what follows it, with the checksum verified before anything is read."""
+def _checked(data: bytes) -> Tuple[int, memoryview]:
+    """Return the length of the header, and header and arrays, with the checksum verified before they are read."""
     if data[: len(MAGIC)] != MAGIC:
         raise ArrayFileError("not a map of this package")
     if len(data) < _FIXED.size + _DIGEST_BYTES:
@@ -74,13 +74,7 @@ def _checked(data: bytes) -> Tuple[Dict[str, Any], memoryview]:
     content = memoryview(data)[:-_DIGEST_BYTES]
     if hashlib.sha256(content).digest() != data[-_DIGEST_BYTES:]:
         raise ArrayFileError("damaged or cut short: its checksum does not fit")
-    try:
-        header = json.loads(bytes(content[_FIXED.size : _FIXED.size + length]).decode())
-    except (ValueError, RecursionError):
-        raise ArrayFileError("its header is not JSON") from None
-    if not isinstance(header, dict):
-        raise ArrayFileError("its header is not an object of JSON")
-    return header, content[_FIXED.size + length :]
+    return length, content[_FIXED.size :]
 
 
 def _planes(array: np.ndarray) -> List[Tuple[bytes, bool]]:

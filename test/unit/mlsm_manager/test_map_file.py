@@ -143,24 +143,16 @@ def _read_or_refused(data):
 
 def _mutated(data, rng):
     """Return the bytes with one of the things done to them that disks, transfers and people do to files."""
-    changed = bytearray(data)
-    kind, place = rng.randint(6), rng.randint(len(data))
-    if kind == 0:
-        changed[place] ^= 1 << rng.randint(8)
-    elif kind == 1:
-        del changed[place:]
-    elif kind == 2:
-        del changed[place : place + rng.randint(1, 50)]
-    elif kind == 3:
-        changed[place:place] = rng.bytes(rng.randint(1, 50))
-    elif kind == 4:
-        length = min(rng.randint(1, 600), len(data) - place)
-        changed[place : place + length] = bytes(length)
-    else:
-        other = rng.randint(len(data))
-        length = min(rng.randint(1, 600), len(data) - max(place, other))
-        changed[place : place + length] = data[other : other + length]
-    return bytes(changed)
+    place, other, length = rng.randint(len(data)), rng.randint(len(data)), rng.randint(1, 600)
+    before, part, after = data[:place], data[place : place + length], data[place + length :]
+    return [
+        before + bytes([part[0] ^ 1 << rng.randint(8)]) + part[1:] + after,
+        before,
+        before + after,
+        before + rng.bytes(length) + part + after,
+        before + bytes(len(part)) + after,
+        before + data[other : other + len(part)] + after,
+    ][rng.randint(6)]
 
 
 @pytest.mark.parametrize(
