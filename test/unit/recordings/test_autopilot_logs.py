@@ -1,7 +1,6 @@
 """Logs of an autopilot as the motion, and the offset of its clock from the echoes."""
 
 import struct
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -105,11 +104,8 @@ def test_a_log_without_an_attitude_or_none_at_all_is_refused(tmp_path):
 def test_a_dataflash_log_is_told_from_ping_viewer_s(tmp_path):
     for name, start in (("flash.BIN", b"\xa3\x95\x80"), ("viewer.bin", b"\0\0\0\x34")):
         (tmp_path / name).write_bytes(start)
-    assert [is_autopilot_log(tmp_path / name) for name in ("flash.BIN", "viewer.bin", "none.bin")] == [
-        True,
-        False,
-        False,
-    ]
+    known = [is_autopilot_log(tmp_path / name) for name in ("flash.BIN", "viewer.bin", "none.bin")]
+    assert known == [True, False, False]
 
 
 def test_a_dataflash_log_gives_degrees_as_radians_and_the_first_estimator_s_positions(tmp_path):
@@ -128,18 +124,20 @@ def test_a_dataflash_log_gives_degrees_as_radians_and_the_first_estimator_s_posi
 def dataflash():
     """Return a log with its formats, an attitude each second, and positions of two estimators."""
     kinds = {
-        129: SimpleNamespace(name=b"ATT", pack="Qccc", fields=b"TimeUS,Roll,Pitch,Yaw", form="<Qhhh"),
-        130: SimpleNamespace(name=b"XKF1", pack="QBfff", fields=b"TimeUS,C,PN,PE,PD", form="<QBfff"),
+        128: (b"FMT", b"BBnNZ", "<BB4s16s64s", b"Type,Length,Name,Format,Columns"),
+        129: (b"ATT", b"Qccc", "<Qhhh", b"TimeUS,Roll,Pitch,Yaw"),
+        130: (b"XKF1", b"QBfff", "<QBfff", b"TimeUS,C,PN,PE,PD"),
     }
+
+    def packed(number, *values):
+        return b"\xa3\x95" + bytes([number]) + struct.pack(kinds[number][2], *values)
+
     out = b""
-    lengths = {128: 89, **{number: 3 + struct.calcsize(kind.form) for number, kind in kinds.items()}}
-    formats = {128: (b"FMT", b"BBnNZ", b"Type,Length,Name,Format,Columns")}
-    formats.update({number: (kind.name, kind.pack.encode(), kind.fields) for number, kind in kinds.items()})
-    for number, (name, pack, fields) in formats.items():
-        out += b"\xa3\x95\x80" + struct.pack("<BB4s16s64s", number, lengths[number], name, pack, fields)
+    for number, (name, pack, form, fields) in kinds.items():
+        out += packed(128, number, 3 + struct.calcsize(form), name, pack, fields)
     for second, yaw in enumerate(YAWS):
         micros = (second + 1) * 10**6
-        out += b"\xa3\x95\x81" + struct.pack("<Qhhh", micros, 0, 0, round(float(np.degrees(yaw)) * 100))
-        out += b"\xa3\x95\x82" + struct.pack("<QBfff", micros, 0, second, 2.0 * second, 3.0)
-        out += b"\xa3\x95\x82" + struct.pack("<QBfff", micros, 1, 99.0, 99.0, 99.0)
+        out += packed(129, micros, 0, 0, round(float(np.degrees(yaw)) * 100))
+        out += packed(130, micros, 0, second, 2.0 * second, 3.0)
+        out += packed(130, micros, 1, 99.0, 99.0, 99.0)
     return out
