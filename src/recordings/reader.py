@@ -100,11 +100,12 @@ def mounted(
     tree: FrameTree, base_frame: str, recorded: RecordedBeams, parameters: MountingParameters
 ) -> Tuple[FrameTree, List[str]]:
     """Return a tree in which every frame of beams is linked to the vehicle, and what was assumed for that."""
-    notes, one = [], parameters
-    vehicle, pose = one.mounted_in or base_frame, one.matrix()
+    notes, mount = [], parameters
+    vehicle, pose = mount.mounted_in or base_frame, mount.matrix()
     words = (
-        f"taken as mounted in {vehicle} at {one.mount_x:g} {one.mount_y:g} {one.mount_z:g} m, yaw {one.mount_yaw:g} rad"
-        f"{', upside down' if one.upside_down else ''} (--set mount_x, mount_y, mount_z, mount_yaw, upside_down)"
+        f"taken as mounted in {vehicle} at {mount.mount_x:g} {mount.mount_y:g} {mount.mount_z:g} m, "
+        f"yaw {mount.mount_yaw:g} rad{', upside down' if mount.upside_down else ''} "
+        "(--set mount_x, mount_y, mount_z, mount_yaw, upside_down)"
     )
     for frame in sorted({beam.frame_id for beam in recorded.beams}):
         if tree.links_between(base_frame, frame) is None:

@@ -45,8 +45,8 @@ class DeleteMark:
     name: str
 
 
-Request = Union[Hello, Mark, DeleteMark]
-"""A Mark: somebody marks a place."""
+MarkRequest = Union[Mark, DeleteMark]  # a Mark: somebody marks a place
+Request = Union[Hello, MarkRequest]
 
 
 def parsed(text: Union[str, bytes]) -> Request:
@@ -90,9 +90,7 @@ def _finite(value: Any) -> Any:
 
 
 def tile_bytes(x: int, y: int, columns: np.ndarray) -> bytes:
-    """Return a tile; columns: (4, n), of each cell its index in the tile, when it was first seen, how surely it is
-    known, place within it.
-    """
+    """Return a tile; columns: (4, n) index of each cell, when it was first seen, strength, place within it."""
     head = struct.pack("<BBHhh", Kind.TILE, 0, columns.shape[1], x, y)
     return head + b"".join(part.astype(kind).tobytes() for part, kind in zip(columns, ("<u2", "<u2", "u1", "u1")))
 

@@ -18,7 +18,7 @@ from tornado.websocket import WebSocketClosedError, WebSocketHandler
 from node_support.errors import RefusedInput
 from node_support.thin_queue import ThinQueue
 from web_page.board import Board
-from web_page.messages import LONGEST_REQUEST, Hello, Request, parsed, text_of
+from web_page.messages import LONGEST_REQUEST, Hello, MarkRequest, parsed, text_of
 from web_page.parameters import WebPageParameters
 
 _PERIOD = 0.25  # s between two looks for what is new
@@ -42,7 +42,7 @@ class Served:
 
     board: Board
     chart: Callable[[], bytes]
-    ask: Callable[[Request], None]
+    ask: Callable[[MarkRequest], None]
     refuse: Callable[[RefusedInput], None]
 
 

@@ -14,7 +14,7 @@ from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, 
 _COLUMNS = ("time", "x", "y", "z", "yaw", "yaw_deg", "heading_deg", "depth")  # docs/map_bag.md; others are left out
 _GREATEST = {"time": 2.0**31}  # s: from there on ROS 1 has no stamps
 _SUFFIXES = (".csv", ".txt", ".tsv")
-_HEADINGS = {"yaw": np.array, "yaw_deg": np.radians, "heading_deg": lambda degrees: np.pi / 2.0 - np.radians(degrees)}
+_HEADINGS = {"yaw": np.asarray, "yaw_deg": np.radians, "heading_deg": lambda degrees: np.pi / 2.0 - np.radians(degrees)}
 """Columns of which one tells the yaw, and how, rad."""
 
 

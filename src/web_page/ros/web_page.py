@@ -1,6 +1,6 @@
 """The ROS side of web_page: beams, fixes, map and diagnostics in; marks out; the rest goes to browsers."""
 
-from typing import List, Optional, Union
+from typing import List, Optional
 
 import numpy as np
 import rospy
@@ -26,7 +26,7 @@ from sonar_processing.ros.beam_subscriber import BeamSubscriber
 from sonar_processing.ros.conversions import header, points_from_message
 from underwater_map_construction.msg import PositionStatus
 from web_page.board import Board
-from web_page.messages import DeleteMark
+from web_page.messages import MarkRequest
 from web_page.parameters import WebPageParameters
 from web_page.scene import Scene
 from web_page.server import PageServer, Served
@@ -78,7 +78,7 @@ class WebPage:
     def _chart(self) -> bytes:
         return marks_geojson(self._marks, self._origin)
 
-    def _ask(self, request: Union[Mark, DeleteMark]) -> None:
+    def _ask(self, request: MarkRequest) -> None:
         """Ask mlsm_core to set or delete a mark; what it answers on MLSM/marks is what pages show."""
         if self._asked.get_num_connections() == 0:
             raise RefusedInput("requests refused", "mlsm_core, which keeps the marks, does not run")
