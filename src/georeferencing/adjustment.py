@@ -135,6 +135,9 @@ def _least_squares(
 
 
 def _residuals(fixes: PlacedFixes, there: np.ndarray, poses: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
-    """Return how far (..., n, 2) [m] fixes lie from the path if the map lies at `poses` (..., 3), and the jacobian."""
+    """Return how far (..., n, 2) the fixes lie from the path, east and north [m], if the map lies at `poses` (..., 3).
+
+    And the jacobian (..., n, 2, 3) by these.
+    """
     turned = rotated(fixes.places, poses[..., 2, np.newaxis])
     return there - poses[..., np.newaxis, :2] - turned, moved_with_origin(turned)

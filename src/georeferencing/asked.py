@@ -62,7 +62,9 @@ class AskedOrigin:
 
 
 def declination_deg(latitude_deg: float, longitude_deg: float, seconds: float) -> float:
-    """Return how far magnetic north lies east of north, deg, by the World Magnetic Model; `seconds`: since 1970.
+    """Return how far magnetic north lies east of north at sea level, deg; `seconds`: since 1970.
+
+    By the World Magnetic Model, with the coefficients that pygeomag carries (2010 to 2030).
 
     Raises RefusedInput for a time without coefficients, near a magnetic pole, and without pygeomag.
     """

@@ -35,7 +35,10 @@ def run_convert_bag() -> None:
 
 
 def convert_bag(arguments: List[str]) -> str:
-    """Convert what arguments name; return what was written. Raises ParameterError, RecordingError and OSError."""
+    """Convert what the arguments name and return in words what was written; exits on a bad command line.
+
+    Raises ParameterError, RecordingError and OSError.
+    """
     options = _parser().parse_args(arguments)
     ending = _MCAP if options.out.suffix == _MCAP else ".bag"
     check_output(options.out, [options.recording], options.overwrite, ending)

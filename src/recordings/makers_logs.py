@@ -32,7 +32,9 @@ _Reader = Callable[[Path], RecordedBeams]
 
 
 def is_makers_log(path: Path) -> bool:
-    """Return whether a file is read here: .852 by its name, Ping Viewer's by its first bytes, tables by columns."""
+    """Return whether a file is a log that is read here: .852 by its name, Ping Viewer's by its first bytes,
+    a table by its columns.
+    """
     return _reader(path) is not None
 
 

@@ -59,7 +59,10 @@ def head_beams(path: Path) -> Tuple[List[Tuple[float, HeadBeam]], int, List[str]
 
 
 def vehicle_headings(path: Path) -> Optional[PoseTrack]:
-    """Return the vehicle's orientations, x north, y west, z up, at the origin; None without. Raises RecordingError."""
+    """Return the vehicle's orientations, x north, y west, z up, at the origin; None of a file without any.
+
+    Raises RecordingError.
+    """
     if not is_ping_viewer_next(path):
         return None
     stamps, rotations = [], []

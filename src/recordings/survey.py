@@ -52,7 +52,10 @@ class Survey:
 
 
 def survey(path: Path, request: Request) -> Survey:
-    """Return what a recording holds and lacks for a request. Raises RecordingError only where it cannot be read."""
+    """Return what a recording holds and lacks for a request.
+
+    Raises RecordingError only for a file that cannot be read.
+    """
     if is_makers_log(path):
         missing: List[str] = []
         recorded, kind = makers_beams(path), "a log or table of beams"

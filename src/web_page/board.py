@@ -10,7 +10,11 @@ NOW, WORDS, TRACK, BEAM, TILE = range(5)  # priorities, where the link is too th
 
 
 class Board:
-    """Holds the newest item under each key for every page that looks; several threads may call it."""
+    """Holds the newest item under each key, and lets it wait for every page that looks.
+
+    Several threads may call it. A page that comes again after a cut link says which change it has seen last, and gets
+    what is newer.
+    """
 
     def __init__(self) -> None:
         self.lock = threading.RLock()

@@ -147,7 +147,10 @@ class Scene:
 
 
 class History:
-    """Keeps rows of numbers, each with its time [s] first, and shows them in chunks; the older, the fewer are left."""
+    """Keeps rows of numbers, each with its time [s] first, and shows them in chunks.
+
+    Memory is bounded: the older rows are, the fewer are left.
+    """
 
     def __init__(self, kind: Kind, least: float, put: Callable[[int, bytes], None]) -> None:
         """`least`: s between two rows. `put` takes the number of a chunk that changed, and its bytes."""

@@ -45,7 +45,10 @@ def box_type(power: int) -> BlockType:
 
 
 def box_lists(blocks: Blocks) -> BoxLists:
-    """Return boxes that cover every block, at least 2 ** THINNEST cells thick, from bottom to top across its cell."""
+    """Return the boxes that cover every block from its bottom to its top across its cell.
+
+    Blocks thinner than 2 ** THINNEST cells are drawn that thick.
+    """
     centers, power, owners = _boxes(blocks)
     tile = cell_keys(blocks.cells >> TILE_BITS)[owners]
     order = np.lexsort((power, tile))

@@ -1,11 +1,14 @@
 """Carves free space (thesis 6.2.1, type FREE) out of what is unknown, and takes blocks away that beams go through.
 
-A first echo says that nothing nearer, in the whole fan, is loud enough to be heard. Sideways the fan is narrow (2.5
-deg), in height it is wide (22 deg: 8 m at 20 m). So a crossed cell is free at the height of the beam's axis only, and a
-block and a beam speak against each other in the inner part of the fan only, where echoes are loud.
+What a beam says. Its first echo says that nothing nearer, in the whole fan, echoes strongly enough to be heard.
+Sideways the fan is narrow (2.5 deg) and says where free space is. In height it is wide (22 deg: 8 m at 20 m), so that
+"free" is a statement about the plane in which the vehicle moves and not about what lies above or below it. A crossed
+cell is therefore noted free at the height of the beam's axis only, while a block speaks against a beam, and the beam
+against the block, when it lies in the inner part of the fan, where echoes are loud.
 
-Kept are how many points fell into a block and how many beams crossed it since, not log-odds: counts do not depend on
-the order of beams within a scan, need no limits to stay able to change, and add up when maps are merged.
+What is kept. Of each block how many points fell into it and how many beams crossed it since the last of them did.
+Counts and not log-odds: they do not depend on the order of beams within a scan, need no limits to stay able to change,
+and add up when maps are merged.
 """
 
 from dataclasses import dataclass
@@ -19,7 +22,7 @@ from node_support.geometry import cell_keys, members
 from node_support.parameters import ParameterSet, parameter
 
 _MOST_POINTS = 50  # more make a block no surer: a ship that lay there for an hour has left once it is not heard
-_ENOUGH = 5  # crossings make a cell as free as it gets, as in OctoMap
+_ENOUGH = 5  # so many crossings make a cell as free as it gets: OctoMap's cells too reach their limit after five misses
 
 
 @dataclass(frozen=True)
@@ -34,7 +37,10 @@ class FirstEchoes:
 
     @staticmethod
     def of_points(points: np.ndarray, times: np.ndarray, origins: np.ndarray) -> "FirstEchoes":
-        """Return the beams of points (n, >= 3) m, one for each of `times` (n,) s, taken from `origins` (n, 3) m."""
+        """Return the beams of points (n, >= 3) m, whose beams were taken at `times` (n,) s from `origins` (n, 3) m.
+
+        Points of one time belong to one beam.
+        """
         ranges = np.linalg.norm(points[:, :3] - origins, axis=1)
         order = np.lexsort((ranges, times))
         first = order[np.append(True, np.diff(times[order]) > 0.0)] if len(order) else order
@@ -174,7 +180,10 @@ class Carver:
     def carve(
         self, occupied: MultiLevelSurfaceMap, free: MultiLevelSurfaceMap, beams: FirstEchoes, points: np.ndarray
     ) -> Tuple[CarveReport, Blocks]:
-        """Carve a scan whose points are in `occupied` already; return a report, and what was not known to be free."""
+        """Carve a scan whose points (n, >= 3) are in `occupied` already; `free` has cells of the same side.
+
+        Return a report, and what was not known to be free.
+        """
         findings = self.findings(occupied, beams, points)
         occupied.count_crossings(findings.rows, findings.beams)
         gone = self.is_outworn(findings.crossed, findings.crossed.crossed + findings.beams)
@@ -218,7 +227,10 @@ class Carver:
 
 
 def note_free(free: MultiLevelSurfaceMap, noted: Blocks) -> Blocks:
-    """Put those blocks, one per cell, into `free` that are not well known to be free at their height; return these."""
+    """Put into `free` which of the blocks, one per cell, are not known well enough to be free at their height.
+
+    Return these.
+    """
     cells = noted.keys
     there, _, owners = free.find(cells)
     known = np.zeros(len(cells), dtype=bool)

@@ -33,7 +33,7 @@ class InsertReport:
 
 
 def admitted(points: np.ndarray, limit: float) -> Tuple[np.ndarray, InsertReport]:
-    """Return which points (n, 4) are finite and have no coordinate beyond `limit` [m], and how many."""
+    """Return which points (n, 4) are finite and have no coordinate beyond `limit` [m], and what became of all."""
     kept, not_finite = _finite_within(np.ascontiguousarray(points, dtype=np.float64), limit)
     return kept, InsertReport(len(kept), len(points) - len(kept) - not_finite)
 
@@ -153,7 +153,11 @@ def _stored_by_bottom(rows, following, head, stored):
 
 @compiled()
 def _pool(parts, block):
-    """Pool intervals (p, ROW_WIDTH) exactly into `block` (Chan et al. 1979), unlike equation 6.6 of the thesis."""
+    """Write what intervals (p, ROW_WIDTH) make together into `block` (ROW_WIDTH,).
+
+    Mean and variance are pooled exactly (Chan, Golub and LeVeque 1979); equation 6.6 of the thesis underestimates the
+    variance.
+    """
     block[:] = parts[0]
     if len(parts) == 1:
         return
@@ -186,7 +190,9 @@ def _row_of(rows, fused, gone):
 
 @compiled()
 def _finite_within(points, limit):
-    """Return points (m, 4) that are finite and have no coordinate beyond `limit` [m], and how many are not finite."""
+    """Return those of points (n, 4) that are finite and have no coordinate beyond `limit` [m], (m, 4) float64, and how
+    many are not finite.
+    """
     kept, number, not_finite = np.empty((len(points), 4)), 0, 0
     for point in range(len(points)):
         is_inside, is_finite = True, True

@@ -59,7 +59,7 @@ class MultiLevelSurfaceMap:
 
     @property
     def nbytes(self) -> int:
-        """Memory in use, bytes; what is reserved but not touched yet costs nothing."""
+        """Memory in use, bytes; what is reserved but not touched yet costs nothing and is not counted."""
         return self._store.nbytes
 
     @property
@@ -134,7 +134,10 @@ class MultiLevelSurfaceMap:
             self._changed.note(self._store.remove(rows))
 
     def insert(self, points: np.ndarray) -> InsertReport:
-        """Insert points (n, 4), x y z [m] and strength; those that are not finite or beyond the limit are left out."""
+        """Insert points (n, 4), x y z [m] and strength, in the map's frame, as one batch.
+
+        Points that are not finite or beyond the limit are left out and counted.
+        """
         kept, report = admitted(points, self.limit)
         self._changed.note(insert_points(self._store, kept))
         return report

@@ -70,7 +70,10 @@ class Bag(AbstractContextManager):
         return isinstance(self._reader, Ros2Reader)
 
     def messages(self, topic: str) -> Iterator[Tuple[int, Any]]:
-        """Yield (time of recording [ns], message) of a topic, in the order of these times; none without the topic."""
+        """Yield (time of recording [ns], message) of one topic, in the order of these times; none without the topic.
+
+        One topic at a time: topics often lie in chunks of their own.
+        """
         connections = [one for one in self._reader.connections if one.topic == topic]
         if not connections:
             return

@@ -70,7 +70,10 @@ class StoreMessages(Messages):
 
 @lru_cache(maxsize=None)
 def maker(store: Typestore, name: str) -> Callable[[], Any]:
-    """Return what makes new messages of a type, package/msg/Name. Raises KeyError for one that is not in the store."""
+    """Return what makes new messages of a type, package/msg/Name; its definition is looked up once only.
+
+    Raises KeyError for a type that the store does not know.
+    """
     kind = store.types[name]
     makers = [_field_maker(store, field) for _, field in store.FIELDDEFS[name][1]]
     return lambda: kind(*[make() for make in makers])

@@ -14,7 +14,10 @@ _NOT_WHOLE = (ReaderError, AssertionError, struct.error, ValueError)  # raised b
 
 
 class Ros1Reader(Reader):
-    """Reads a bag by its index or, where that is missing (`is_cut`), each chunk that is whole."""
+    """Reads a bag by its index, or, where that is missing, chunk by chunk; a last chunk that is not whole is left out.
+
+    is_cut: whether the index is missing.
+    """
 
     is_cut = False
 

@@ -51,7 +51,10 @@ def is_autopilot_log(path: Path) -> bool:
 
 
 def motion_of_autopilot(path: Path, names: MotionNames) -> Motion:
-    """Return attitude and the estimator's positions, or the depth where it has none. Raises RecordingError."""
+    """Return the motion in a log: attitude and the estimator's positions, or attitude and depth where it has none.
+
+    Raises RecordingError.
+    """
     rows, fixes = _rows(path)
     attitude = next((rows[kind] for kind in _ATTITUDES if kind in rows), None)
     if attitude is None:

@@ -114,7 +114,10 @@ def frame_tree(bag: Bag) -> FrameTree:
 
 
 def pose_track(messages: Iterable[Any]) -> PoseTrack:
-    """Return the poses of Odometry or PoseStamped messages, maybe none. Raises AttributeError for messages without."""
+    """Return the poses of Odometry, PoseStamped or PoseWithCovarianceStamped messages; may be empty.
+
+    Raises AttributeError for messages that have no pose.
+    """
     poses = ((one.header, getattr(one.pose, "pose", one.pose)) for one in messages)
     return _track([(stamp_ns(header), _vector(pose.position), _rotation(pose.orientation)) for header, pose in poses])
 

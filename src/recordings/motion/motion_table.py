@@ -11,7 +11,17 @@ from recordings.motion.frame_tree import FrameTree
 from recordings.motion.pose_track import FARTHEST, PoseTrack
 from recordings.motion.vehicle_motion import Motion, MotionNames, MotionSource, linked
 
-_COLUMNS = ("time", "x", "y", "z", "yaw", "yaw_deg", "heading_deg", "depth")  # docs/map_bag.md; others are left out
+COLUMNS = {
+    "time": "s, of the same clock as the beams",
+    "x": "m, east or any other fixed direction",
+    "y": "m, to the left of x",
+    "z": "m, up",
+    "yaw": "rad, counter-clockwise from x",
+    "yaw_deg": "degrees, counter-clockwise from x",
+    "heading_deg": "degrees, clockwise from north, as a compass counts",
+    "depth": "m, down",
+}
+"""Columns that are read, by the names in the first line; others are left out."""
 _GREATEST = {"time": 2.0**31}  # s: from there on ROS 1 has no stamps
 _SUFFIXES = (".csv", ".txt", ".tsv")
 _HEADINGS = {"yaw": np.asarray, "yaw_deg": np.radians, "heading_deg": lambda degrees: np.pi / 2.0 - np.radians(degrees)}
@@ -41,9 +51,9 @@ def rows_of(path: Path) -> Iterator[List[str]]:
 
 
 def motion_of_csv(path: Path, names: MotionNames) -> Motion:
-    """Return the motion in a table with `time` [s], one of the headings, and where known x, y to its left and z up [m].
+    """Return the motion in a table with columns of `COLUMNS`: `time`, one of the headings, and x and y if known.
 
-    A yaw counts counter-clockwise from x. Raises RecordingError, with path and line, for a table that cannot be used.
+    Raises RecordingError, with path and line, for a table that cannot be used.
     """
     table = _read(path)
     headings = [name for name in _HEADINGS if name in table]
@@ -66,7 +76,7 @@ def motion_of_csv(path: Path, names: MotionNames) -> Motion:
 
 def _read(path: Path) -> Dict[str, np.ndarray]:
     names, *rows = rows_of(path)
-    kept = [(index, name) for index, name in enumerate(names) if name in _COLUMNS]
+    kept = [(index, name) for index, name in enumerate(names) if name in COLUMNS]
     lines = [(number, row) for number, row in enumerate(rows, start=2) if any(row)]
     if len(lines) < 2:
         raise RecordingError(f"{path}: {len(lines)} rows; needs at least 2")

@@ -41,7 +41,10 @@ class PoseTrack:
 
     @classmethod
     def fixed(cls, translation: np.ndarray, rotation: np.ndarray) -> "PoseTrack":
-        """Return a pose that never changes: (3,) m and (4,) x y z w. Raises ValueError if it is no pose."""
+        """Return a pose that never changes: translation (3,) m, rotation (4,) x, y, z, w.
+
+        Raises ValueError if it is no pose.
+        """
         track = cls.sorted_from(np.zeros(1, dtype=np.int64), translation, rotation)
         if not len(track):
             raise ValueError(f"translation {translation}, quaternion {rotation}: no pose")

@@ -155,8 +155,8 @@ def _images(before: List[Beam], sweep: List[Beam]) -> Tuple[np.ndarray, np.ndarr
     joined = max(round(_BIN / sweep[0].range_resolution), 1)
     length = joined * sweep[0].range_resolution
     images = [_image(one, own, step, joined) for one, own in zip((before, sweep), angles)]
-    # Taken off is what all directions have, as of the head itself; the root, so that no strong echo counts for all.
     usual = np.nanmedian(np.concatenate(images), axis=0)
+    # The root, so that one strong echo does not count for all others.
     far = [np.sqrt(np.maximum(image - usual, 0.0))[:, int(_NEAREST / length) :] for image in images]
     return far[0], far[1], step, length
 

@@ -56,8 +56,9 @@ class Played:
 class BagPlayer:
     """Publishes the messages of a bag and /clock at their pace, then ends the node.
 
-    `rosbag play` publishes /clock only between two messages, and unpacks a chunk for each where topics lie in chunks of
-    their own: with three such topics /clock stood still at eight times real time. So the bag is read first.
+    `rosbag play` publishes /clock only while it waits for the next message. It reads every message when it is due, and
+    where topics lie in chunks of their own it unpacks a chunk each time: with three such topics it fell behind at eight
+    times real time, and /clock stood still from then on. This player reads the bag first, one topic after the other.
     """
 
     def __init__(self, options: Namespace) -> None:

@@ -20,7 +20,10 @@ _PLY_TYPES = {"f8": "double", "u4": "uint", "u1": "uchar"}
 
 
 def write_ply(path: Path, blocks: Blocks) -> None:
-    """Write a binary PLY: mean x y z, intensity, their variances, bottom, height, count, type of each block."""
+    """Write a binary PLY: x y z of each block's mean, intensity, variances, bottom, height, count and type.
+
+    Raises OSError.
+    """
     axes = ("x", "y", "z", "intensity")
     columns = {**dict(zip(axes, blocks.mean.T)), **dict(zip((f"variance_{axis}" for axis in axes), blocks.variance.T))}
     columns.update(bottom=blocks.bottom, height=blocks.height, count=blocks.count, type=blocks.type)

@@ -49,7 +49,10 @@ class MapFolder:
         return path
 
     def put_aside(self, name: str) -> None:
-        """Give the map of that name, if there is one, the name NAME.previous, as only one has. Raises OSError."""
+        """Give the map of that name the name NAME.previous; one that had it is gone. Raises OSError.
+
+        Where there is no map of that name, as when another node has put it aside already, nothing is done.
+        """
         path = self.path(name)
         with suppress(FileNotFoundError):
             os.replace(str(path), str(path.with_name(f"{path.name[: -len(ENDING)]}.previous{ENDING}")))

@@ -50,7 +50,10 @@ _MEANINGS = {
 
 
 def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -> np.ndarray:
-    """Return (n, 3) red, green and blue from 0 to 1; `limits`: the values of the lowest and the highest colour."""
+    """Return (n, 3) red, green and blue from 0 to 1; `limits` are the values of the lowest and the highest colour.
+
+    The age of a block is the number of beams that crossed it since a point last fell into it.
+    """
     if by is ColorBy.TYPE:
         return np.array(list(TYPE_COLORS.values()))[blocks.type]
     low, high = limits or color_limits(blocks, by)

@@ -46,7 +46,10 @@ def occupancy(occupied: Blocks, free: Blocks, low: float, high: float) -> Raster
 
 
 def elevation(blocks: Blocks) -> Raster:
-    """Return a float64 raster of each cell's highest point, m, NaN without one. Raises ExportError as `occupancy`."""
+    """Return a float64 raster of the highest point in each cell, m, NaN where there is none.
+
+    Raises ExportError for a raster that is too large.
+    """
     low_cell, shape = box_around(blocks.cells)
     values = np.full(shape, -np.inf)
     np.maximum.at(values, tuple((blocks.cells - low_cell).T[::-1]), blocks.height)
@@ -104,7 +107,10 @@ _MARGIN = 4  # cells around the map, so that its rim is no edge
 
 
 def ridges(blocks: Blocks) -> np.ndarray:
-    """Return short lines (n, 2 ends, 2) m along the middle of each band of points of any height, as seen from above."""
+    """Return short lines (n, 2 ends, 2) m that run along the middle of each band of points, as seen from above.
+
+    Points of all heights count. Where they form no band, there is no line.
+    """
     if not len(blocks):
         return np.empty((0, 2, 2))
     numbers, low, side = counts(blocks)
