@@ -59,7 +59,10 @@ def turning_time(gradians: int) -> float:
 
 
 def beam_time(step: int, pulse: PulseSettings, baud_rate: float) -> float:
-    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds."""
+    """Return how long it takes at most from one beam to the next, `step` gradians further, in seconds.
+
+    baud_rate: bits per second.
+    """
     length = HEADER_LENGTH + _BEAM_HEADER + pulse.number_of_samples + CHECKSUM_LENGTH
     return turning_time(step) + pulse.listening_time + transmission_time(length, baud_rate)
 

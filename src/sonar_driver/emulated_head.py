@@ -129,7 +129,10 @@ _RINGING_REACH = 0.3  # m
 
 
 def square_basin(wall_distance: float = 4.0) -> EchoSource:
-    """Return the echoes of four walls, `wall_distance` m or more from the head at their centre, above weak ringing."""
+    """Return the echoes of the four walls of a square basin with the head at its centre, scaled by the gain.
+
+    Each wall is a blurred peak above weak ringing; `wall_distance` is the shortest distance to each, in metres.
+    """
 
     def echoes(ping: PingRequest) -> bytes:
         wall = wall_distance / max(abs(math.cos(ping.angle)), abs(math.sin(ping.angle)))

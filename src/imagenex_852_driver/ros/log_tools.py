@@ -30,7 +30,7 @@ _WAIT_STEP = 0.05  # s: soon enough for a person
 
 
 def run_player() -> None:
-    """Publish a log, then end; several may play at once."""
+    """Publish a log, then end; several may play at once. Exits on a bad command line."""
     parser = CommandLine("play_852", description="Publish the pings of a .852 log on sonar/raw.")
     parser.add_argument("file", help="log to play")
     parser.add_argument("--rate", type=positive, help="pings per second (default: as logged, or 10 without times)")
@@ -43,6 +43,7 @@ def run_player() -> None:
 
 
 def run_recorder() -> None:
+    """Record until the node ends; exits on a bad command line."""
     parser = CommandLine("record_852", description="Append the beams of sonar/raw to a .852 log.")
     parser.add_argument("file", help="log to append to")
     parser.add_argument("--driver", default="imagenex_852_driver", help="node whose settings go into the log")

@@ -47,8 +47,9 @@ class DriverNode:
     ) -> None:
         """Raises ParameterError for a bad parameter and StartError for an unusable port.
 
-        parameters: those of line, mounting and head, with a `command`. message: makes the message of a ping and the
-        parameters, but for its header and the angle of the servo; None if it holds no echoes.
+        parameters: those of line, mounting and head, with a `command`; `LineParameters` and `MountingParameters` are
+        among their bases. device: takes parameters, a stop event and a clock. message: makes the message of a ping, but
+        for its header and the angle of the servo; None if it holds no echoes.
         """
         self._make_device = device
         self._message = message

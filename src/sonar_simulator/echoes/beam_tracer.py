@@ -96,7 +96,7 @@ class ConePattern:
         return slopes / np.sqrt(np.einsum("...i,...i", slopes, slopes))[..., np.newaxis]
 
     def planes(self) -> np.ndarray:
-        """Return (16, 3) inward normals; four of them bound the cone below, above, right and left."""
+        """Return (16, 3) unit normals, inward; four of them bound the cone below, above, right and left."""
         half = self.opening / 2.0
         turn = np.arange(_SIDES) * 2.0 * math.pi / _SIDES
         return np.column_stack(
@@ -104,6 +104,7 @@ class ConePattern:
         )
 
     def shares(self) -> np.ndarray:
+        """Return (rays,) the share of the beam's solid angle that each ray represents."""
         return np.full(self.rays, 1.0 / self.rays)
 
 

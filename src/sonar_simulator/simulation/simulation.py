@@ -144,6 +144,7 @@ class Simulation:
     """Runs once, forwards. Ticks come at a steady rate, pings when the head sends them.
 
     `T_base_sonar` (4, 4) is the sonar's mount with its servo at 0, `T_world_start` (4, 4) where the vehicle starts.
+    `commanded` is the vehicle that follows velocity commands; where the script drives, it is not used.
     """
 
     def __init__(self, settings: Settings, folder: Path, robot: RobotDescription, warn: Callable[[str], None]) -> None:
