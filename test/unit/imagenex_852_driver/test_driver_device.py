@@ -2,14 +2,13 @@
 
 import pytest
 from emulated_drivers import EPOCH, IMAGENEX_852, VirtualScan, running, served
-from virtual_line import VirtualStopAt, VirtualTime
 
 from imagenex_852_driver.command import SwitchCommand
 from imagenex_852_driver.device import ReplyWait, SonarDevice
-from imagenex_852_driver.emulated_852 import Emulated852, EmulatorParameters
+from imagenex_852_driver.emulated_852 import Emulated852
 from imagenex_852_driver.parameters import ConnectionParameters, Direction, HeadSettings
 from imagenex_852_driver.reply import ParsedReply, Reply, ReplyKind
-from sonar_driver.emulated_head import Fault, FaultInjector, Transmission
+from sonar_driver.emulated_head import Transmission
 from sonar_driver.port import PortUnavailableError
 
 LONG_RANGE = SwitchCommand(max_range=30)
@@ -80,14 +79,9 @@ def test_the_missing_bytes_are_those_of_a_whole_reply(wait, received):
 
 
 @pytest.fixture
-def faults():
-    return FaultInjector(EmulatorParameters(lateness=0.2, silence_duration=0.3))
-
-
-@pytest.fixture
-def device(faults):
-    """Return a device in virtual time on a head with these faults."""
-    return VirtualScan(IMAGENEX_852, faults=faults).device
+def device():
+    """Return a device in virtual time on a head."""
+    return VirtualScan(IMAGENEX_852).device
 
 
 def test_a_ping_brings_the_reply_to_its_command_and_leaves_when_its_last_byte_has(device):
@@ -95,23 +89,6 @@ def test_a_ping_brings_the_reply_to_its_command_and_leaves_when_its_last_byte_ha
     assert (ping.command, ping.reply.kind, ping.reply.max_range) == (COMMAND, ReplyKind.IGX, 50)
     assert ping.stamp == pytest.approx(EPOCH + 27 * 10 / 1152000)
     assert device.stats.replies == 1
-
-
-@pytest.mark.parametrize(
-    ("fault", "count", "told"),
-    [
-        (Fault.DROPPED, "timeouts", "no reply within"),
-        (Fault.SILENCE, "timeouts", "no reply within"),
-        (Fault.LATE, "timeouts", "came late"),
-        (Fault.GARBLED, "bad_frames", "bad reply"),
-        (Fault.TRUNCATED, "bad_frames", "bad reply"),
-    ],
-)
-def test_a_reply_that_does_not_come_in_time_is_a_timeout_and_a_spoilt_one_is_bad(device, faults, fault, count, told):
-    faults.order(fault)
-    assert device.ping(COMMAND) is None
-    assert getattr(device.stats, count) == device.stats.timeouts + device.stats.bad_frames == 1
-    assert told in device.stats.last_error
 
 
 class FixedReplyHead(Emulated852):
@@ -132,15 +109,6 @@ def test_an_answer_to_another_question_is_a_bad_frame(asked, complaint):
     device = VirtualScan(IMAGENEX_852, head=FixedReplyHead, told={"head_id": asked.head_id}).device
     assert device.ping(asked) is None
     assert complaint in device.stats.last_error
-
-
-def test_a_stop_interrupts_a_ping_at_once(faults):
-    stop = VirtualStopAt(VirtualTime(), 0.05)
-    device = VirtualScan(IMAGENEX_852, faults=faults, stop=stop).device
-    faults.order(Fault.SILENCE)
-    assert device.ping(SwitchCommand(max_range=50, switch_delay_ms=510)) is None
-    assert stop.time.now < 0.05 + 0.1
-    assert device.stats.interrupted == 1
 
 
 def test_a_port_that_goes_away_is_reported_and_closed(tmp_path):

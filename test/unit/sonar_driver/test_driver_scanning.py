@@ -1,5 +1,6 @@
 """What the driver of every sonar does with its head: over faults, losses of the line and stops."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -90,6 +91,14 @@ COUNTED = {
 }
 # A driver that has nothing to ask notes a gap, and takes what is late.
 WITHOUT_REQUESTS = {**COUNTED, Fault.DROPPED: "missing_beams", Fault.LATE: "replies"}
+# What is told with a count.
+TOLD = {
+    "bad_frames": "bad reply|a broken message",
+    "unexpected_replies": "a reply came (late or )?twice|no beam in time",
+    "refusals": "the head refused message",
+    "overruns": "the head lost characters",
+    "timeouts": "no reply within|no beam in time",
+}
 
 
 @pytest.mark.parametrize("fault", COUNTED)
@@ -104,6 +113,7 @@ def test_each_fault_is_counted_and_every_good_beam_delivered_once(virtual, fault
     count = (WITHOUT_REQUESTS if sonar is PING360 else COUNTED)[fault]
     before = getattr(scan.stats, count)
     scan.until(lambda: getattr(scan.stats, count) == before + 1)
+    assert re.search(TOLD.get(count, ""), scan.stats.last_error)
     scan.beams(3)
     lost = set() if fault in (*sonar.good, Fault.REFUSED) else {2}
     assert scan.numbers == [one for one in range(scan.numbers[-1] + 1) if one not in lost]
