@@ -115,14 +115,6 @@ class LineDevice(ABC, Generic[Command, Ping]):
         self._back_off = connection.back_off_first
         self._last_reply = elapsed()
 
-    def connect(self) -> None:
-        """Open the port for the first time; `run` waits for a port that does not exist yet.
-
-        Raises PortRefusedError, whose reason the user must correct.
-        """
-        with contextlib.suppress(PortUnavailableError):
-            self.open()
-
     def run(self, on_ping: Callable[[Ping], None]) -> None:
         """Ping until the stop event is set, then close the port.
 

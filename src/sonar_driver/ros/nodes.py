@@ -27,7 +27,7 @@ from sonar_driver.emulated_head import (
     FaultInjector,
 )
 from sonar_driver.head_server import HeadServer, ServedLine
-from sonar_driver.port import PortError
+from sonar_driver.port import PortRefusedError, PortUnavailableError
 from underwater_map_construction.msg import SonarScanLine
 from underwater_map_construction.srv import OrderFault, OrderFaultRequest, OrderFaultResponse
 
@@ -61,12 +61,11 @@ class DriverNode:
         self._beams = rospy.Publisher(topics.BEAMS, SonarScanLine, queue_size=200, tcp_nodelay=True)
         self._tilt = JointAngle(self._live.current.sensor_joint, self.health)
         try:
-            self._device.connect()
-        except PortError as error:
+            self._device.open()
+        except PortRefusedError as error:
             raise StartError(str(error)) from error
-        stats = self._stats()
-        if not stats.connected:
-            rospy.logwarn("%s: %s; waiting for it", name, stats.last_error)
+        except PortUnavailableError:
+            rospy.logwarn("%s: %s; waiting for it", name, self._device.stats.last_error)
         self._thread = threading.Thread(target=self._scan, daemon=True)
         self._thread.start()
         rospy.on_shutdown(self._end)

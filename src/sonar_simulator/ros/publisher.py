@@ -28,11 +28,7 @@ CLASSES: Dict[str, type] = {
 """By their names."""
 
 
-def _made(kind: str) -> Message:
-    return CLASSES[kind]()
-
-
-MESSAGES = MomentMessages(_made, lambda values: values.tobytes())
+MESSAGES = MomentMessages(lambda kind: CLASSES[kind](), lambda values: values.tobytes())
 """Fills in messages of rospy."""
 # Transparent, because the map grows on the world and must be visible through it.
 _OPACITY = 0.45

@@ -141,13 +141,13 @@ class World:
 
     def outlines(self) -> List[np.ndarray]:
         """Return the outlines from above of all shapes but ground: closed (k, 2) polylines, m, first point repeated."""
-        corners = [shape.triangles()[0] for shape in self.shapes]
-        return [_outline(vertices[:, :2]) for vertices in corners if not _is_ground(vertices)]
-
-
-def _is_ground(vertices: np.ndarray) -> bool:
-    width_x, width_y, height = np.ptp(vertices, axis=0)
-    return min(width_x, width_y) > _GROUND_RATIO * height
+        outlines = []
+        for shape in self.shapes:
+            vertices, _ = shape.triangles()
+            width_x, width_y, height = np.ptp(vertices, axis=0)
+            if min(width_x, width_y) <= _GROUND_RATIO * height:
+                outlines.append(_outline(vertices[:, :2]))
+        return outlines
 
 
 def _outline(points: np.ndarray) -> np.ndarray:

@@ -4,7 +4,7 @@ import math
 import socket
 import threading
 import time
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Callable, List, Tuple
 
@@ -20,7 +20,7 @@ from ping360_driver.parameters import HeadSettings
 from sonar_driver.device import LineDevice
 from sonar_driver.emulated_head import Fault, FaultInjector, FaultRates
 from sonar_driver.head_server import HeadServer, PtyLine, UdpLine
-from sonar_driver.port import LineParameters, datagram_address, is_datagram_port
+from sonar_driver.port import LineParameters, PortUnavailableError, datagram_address, is_datagram_port
 
 PATIENCE = 60.0
 EPOCH = 1000.0
@@ -134,7 +134,8 @@ class Scanning:
         self._thread = threading.Thread(target=self.device.run, args=(self._note,), daemon=True)
 
     def __enter__(self):
-        self.device.connect()
+        with suppress(PortUnavailableError):
+            self.device.open()
         self._thread.start()
         return self
 

@@ -76,7 +76,7 @@ def test_a_second_driver_on_the_port_does_not_start(tmp_path):
     with running(IMAGENEX_852, tmp_path / "sonar") as (scan, _):
         second = IMAGENEX_852.device(scan.device.connection)
         with pytest.raises(PortRefusedError, match="in use by another program"):
-            second.connect()
+            second.open()
 
 
 # As what each fault is counted.
