@@ -1,11 +1,11 @@
 """The Ping360 scans by itself or is asked for every ping; who is at the other end of its line."""
 
-import time
+import math
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from emulated_drivers import EPOCH, PATIENCE, PING360, PING360_REQUESTS, VirtualScan, running, served
+from emulated_drivers import EPOCH, PING360, PING360_REQUESTS, VirtualScan, running, served, wait_until
 
 from ping360_driver.device import Ping360Device
 from ping360_driver.emulated_ping360 import EmulatedPing360, EmulatorParameters
@@ -174,7 +174,4 @@ def test_a_stop_ends_the_scan_of_the_head_too(tmp_path):
     with running(PING360, tmp_path / "sonar", sector) as (scan, server):
         assert scan.wait_for_more(2)
         assert scan.stop()
-        end = time.monotonic() + PATIENCE
-        while server.head.next_event < float("inf") and time.monotonic() < end:
-            time.sleep(0.01)
-        assert server.head.next_event == float("inf")
+        assert wait_until(lambda: server.head.next_event == math.inf)

@@ -8,7 +8,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from typing import Callable, List, Tuple
 
-from virtual_line import VirtualLine, VirtualStop, VirtualTime
+from virtual_line import VirtualLine, VirtualTime
 
 from imagenex_852_driver import emulated_852
 from imagenex_852_driver import parameters as parameters_852
@@ -123,15 +123,24 @@ class RecordingInjector(FaultInjector):
         return fault
 
 
+def wait_until(ready):
+    """Wait until `ready`, on a machine that may be busy; return whether it came to that."""
+    end = time.monotonic() + PATIENCE
+    while time.monotonic() < end:
+        if ready():
+            return True
+        time.sleep(_POLL)
+    return False
+
+
 class Scanning:
-    """A scanner in a thread, with the pings it delivered."""
+    """A driver in a thread, with the pings it delivered."""
 
     def __init__(self, sonar, connection, settings=None):
         self.pings = []
         self.device = sonar.device(connection, threading.Event())
         self.device.command = (settings or sonar.settings).command()
-        self._news = threading.Condition()
-        self._thread = threading.Thread(target=self.device.run, args=(self._note,), daemon=True)
+        self._thread = threading.Thread(target=self.device.run, args=(self.pings.append,), daemon=True)
 
     def __enter__(self):
         with suppress(PortUnavailableError):
@@ -146,30 +155,16 @@ class Scanning:
     def stats(self):
         return self.device.stats
 
-    def stop(self, timeout=PATIENCE):
+    def stop(self):
         """Stop; return whether the thread ended in time."""
         self.device.stop.set()
-        self._thread.join(timeout)
+        self._thread.join(PATIENCE)
         return not self._thread.is_alive()
-
-    def wait(self, ready, timeout=PATIENCE):
-        """Wait until the pings, or the counts, satisfy `ready`; return whether they do."""
-        end = time.monotonic() + timeout
-        with self._news:
-            while not ready(self.pings) and time.monotonic() < end:
-                # Counts change without news.
-                self._news.wait(_POLL)
-            return ready(self.pings)
 
     def wait_for_more(self, count=1):
         """Wait for `count` more pings than there are now; return whether they came."""
         wanted = len(self.pings) + count
-        return self.wait(lambda pings: len(pings) >= wanted)
-
-    def _note(self, ping):
-        with self._news:
-            self.pings.append(ping)
-            self._news.notify_all()
+        return wait_until(lambda: len(self.pings) >= wanted)
 
 
 class HideableServer(HeadServer):
@@ -185,9 +180,7 @@ class HideableServer(HeadServer):
 
     def _wait_until_present_is(self, wanted):
         self._wake()
-        end = time.monotonic() + PATIENCE
-        while self._present is not wanted and time.monotonic() < end:
-            time.sleep(_POLL)
+        wait_until(lambda: self._present is wanted)
 
 
 @contextmanager
@@ -220,17 +213,16 @@ class VirtualScan:
     head: the class of the head. told: parameters of the head. changes: of the line's parameters.
     """
 
-    def __init__(self, sonar, port="virtual", settings=None, faults=None, stop=None, head=None, told=(), **changes):
+    def __init__(self, sonar, port="virtual", settings=None, faults=None, time=None, head=None, told=(), **changes):
         self.settings = settings or sonar.settings
         self.pings = []
         self.echoes = NumberedEchoes()
-        stop = stop or VirtualStop(VirtualTime())
-        self.time = stop.time
+        self.time = time or VirtualTime()
         connection = replace(sonar.connection, port=port, **{**EXACT, **changes})
         self.head = sonar.emulated(connection, faults, self.echoes, head, **dict(told))
         baud_rate = math.inf if is_datagram_port(port) else connection.baud_rate
-        line = VirtualLine(self.head, baud_rate, stop.time)
-        self.device = sonar.device(connection, stop, self.clock, stop.time.elapsed, line.open)
+        line = VirtualLine(self.head, baud_rate, self.time)
+        self.device = sonar.device(connection, self.time, self.clock, self.time.elapsed, line.open)
         self.device.open()
 
     def clock(self):

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import List, Set
 
 from emulated_drivers import EXACT, SONARS, RecordingInjector, Sonar, VirtualScan
-from virtual_line import VirtualStop, VirtualTime
+from virtual_line import VirtualTime
 
 from sonar_driver.device import LineStats
 
@@ -45,13 +45,13 @@ def fault_rates(sonar, rate, reply_margin):
 
 def run(sonar: Sonar, commands: int = 10000, rate: float = 1.0 / 24.0, seed: int = 0) -> Account:
     """Let the head send or spoil `commands` replies; return the account."""
-    stop = VirtualStop(VirtualTime())
-    faults = RecordingInjector(fault_rates(sonar, rate, EXACT["reply_margin"]), seed, commands, stop)
-    scan = VirtualScan(sonar, faults=faults, stop=stop)
+    time = VirtualTime()
+    faults = RecordingInjector(fault_rates(sonar, rate, EXACT["reply_margin"]), seed, commands, time)
+    scan = VirtualScan(sonar, faults=faults, time=time)
     scan.scan()
     expected = [number for number, fault in enumerate(faults.of_pings) if fault in sonar.good]
     optional = {number for number, fault in enumerate(faults.of_pings) if fault in sonar.optional}
-    return Account(expected, optional, scan.numbers, dict(faults.counts), scan.stats, stop.time.now)
+    return Account(expected, optional, scan.numbers, dict(faults.counts), scan.stats, time.now)
 
 
 def main(name: str = "imagenex_852", commands: str = "10000", rate: str = str(1 / 24)) -> None:

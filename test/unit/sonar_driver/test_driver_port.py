@@ -3,11 +3,10 @@
 import errno
 import socket
 import threading
-import time
 
 import pytest
 import serial
-from emulated_drivers import IMAGENEX_852, free_udp_port, served
+from emulated_drivers import IMAGENEX_852, free_udp_port, served, wait_until
 
 from imagenex_852_driver.command import SwitchCommand
 from imagenex_852_driver.device import SonarDevice
@@ -85,17 +84,10 @@ def ends():
     head.close()
 
 
-def received(head):
-    end, data = time.monotonic() + 60.0, b""
-    while not data and time.monotonic() < end:
-        data = head.read()
-    return data
-
-
 def test_bytes_go_there_and_back_and_the_rest_of_a_datagram_is_kept_for_the_next_read(ends):
     head, port = ends
     port.write(b"command")
-    assert received(head) == b"command"
+    assert wait_until(lambda: head.read() == b"command")
     head.write(b"abcdef")
     assert (port.read(2), port.in_waiting, port.read(4)) == (b"ab", 4, b"cdef")
 

@@ -15,9 +15,10 @@ from emulated_drivers import (
     free_udp_port,
     running,
     served,
+    wait_until,
 )
 from fault_experiment import run
-from virtual_line import VirtualStopAt, VirtualTime
+from virtual_line import VirtualTime
 
 from sonar_driver.emulated_head import Fault, FaultInjector
 from sonar_driver.port import PortRefusedError
@@ -48,7 +49,7 @@ def test_the_scan_goes_on_after_the_line_was_away(ends):
     with running(*ends) as (scan, server):
         assert scan.wait_for_more(2)
         server.disappear()
-        assert scan.wait(lambda _: not scan.stats.connected)
+        assert wait_until(lambda: not scan.stats.connected)
         server.reappear()
         assert scan.wait_for_more(2)
     assert scan.stats.connections == 2
@@ -125,7 +126,7 @@ def test_each_fault_is_counted_and_every_good_beam_delivered_once(virtual, fault
 def test_the_scan_goes_on_within_two_seconds_after_the_head_was_away(virtual, fault, absence):
     sonar, port = virtual
     faults = FaultInjector(sonar.rates(silence_duration=absence, absence_duration=absence))
-    scan = VirtualScan(sonar, port, faults=faults, stop=VirtualStopAt(VirtualTime(), absence + 5.0))
+    scan = VirtualScan(sonar, port, faults=faults, time=VirtualTime(absence + 5.0))
     faults.order(Fault.NONE)
     faults.order(fault)
     scan.scan()
@@ -136,8 +137,7 @@ def test_the_scan_goes_on_within_two_seconds_after_the_head_was_away(virtual, fa
 def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(virtual):
     sonar, port = virtual
     faults = FaultInjector(sonar.rates(silence_duration=3.0))
-    stop = VirtualStopAt(VirtualTime(), 10.0)
-    scan = VirtualScan(sonar, port, faults=faults, stop=stop, reopen_after=0.2)
+    scan = VirtualScan(sonar, port, faults=faults, time=VirtualTime(10.0), reopen_after=0.2)
     faults.order(Fault.SILENCE)
     scan.scan()
     assert scan.stats.connections > 1
@@ -148,7 +148,7 @@ def test_a_head_that_stays_silent_makes_the_driver_reopen_the_port(virtual):
 def test_a_stop_ends_the_scan_at_once(virtual, fault):
     sonar, port = virtual
     faults = FaultInjector(sonar.rates(silence_duration=60.0, absence_duration=60.0))
-    scan = VirtualScan(sonar, port, faults=faults, stop=VirtualStopAt(VirtualTime(), 3.0))
+    scan = VirtualScan(sonar, port, faults=faults, time=VirtualTime(3.0))
     faults.order(fault)
     scan.scan()
     assert scan.time.now < 3.0 + 0.2

@@ -1,5 +1,6 @@
 """A serial line in time that passes only while somebody waits: an hour of it takes seconds, and always the same."""
 
+import math
 import threading
 from collections import deque
 from typing import Deque, Optional
@@ -8,44 +9,26 @@ from sonar_driver.emulated_head import EmulatedHead, Transmission
 from sonar_driver.port import READ_TIMEOUT, PortUnavailableError, transmission_time
 
 
-class VirtualTime:
-    """Seconds since the experiment began."""
+class VirtualTime(threading.Event):
+    """Seconds `now` since the experiment began; a device's stop event, whose waits pass the time, set at `end`."""
 
-    def __init__(self) -> None:
+    def __init__(self, end: float = math.inf) -> None:
+        super().__init__()
         self.now = 0.0
+        self._end = end
 
     def elapsed(self) -> float:
         """Return the time, s."""
         return self.now
 
-
-class VirtualStop(threading.Event):
-    """The device's stop event; its waits pass the time."""
-
-    def __init__(self, time: VirtualTime) -> None:
-        super().__init__()
-        self.time = time
-
-    def wait(self, timeout: Optional[float] = None) -> bool:
-        """Let `timeout` seconds pass at once."""
-        self.time.now += timeout or 0.0
-        return self.is_set()
-
-
-class VirtualStopAt(VirtualStop):
-    """A stop event that somebody sets at a moment of the virtual time."""
-
-    def __init__(self, time: VirtualTime, moment: float) -> None:
-        super().__init__(time)
-        self._moment = moment
-
     def is_set(self) -> bool:
-        """Return whether the moment has come."""
-        return self.time.now >= self._moment
+        """Return whether the event was set, or the end has come."""
+        return super().is_set() or self.now >= self._end
 
     def wait(self, timeout: Optional[float] = None) -> bool:
-        """Let `timeout` seconds pass at once, but end at the moment."""
-        return super().wait(max(min(timeout or 0.0, self._moment - self.time.now), 0.0))
+        """Let `timeout` seconds pass at once, but not beyond the end."""
+        self.now += max(min(timeout or 0.0, self._end - self.now), 0.0)
+        return self.is_set()
 
 
 class VirtualLine:
