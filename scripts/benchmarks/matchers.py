@@ -1,7 +1,6 @@
 """The matchers that figures compare, with default parameters: ours, the thesis's, and Open3D's generalised ICP."""
 
 import time
-from enum import Enum
 from importlib import import_module
 from typing import Any, Callable, Dict
 
@@ -108,16 +107,10 @@ def _result(
     )  # fmt: skip
 
 
-class MatcherName(Enum):
-    """Their names in tables."""
-
-    DISTRIBUTIONS = "DISTRIBUTIONS"
-    THESIS = "THESIS"
-    GICP = "GICP"
-
-
-MATCHERS: Dict[MatcherName, Callable[[], Matcher]] = {
-    MatcherName.DISTRIBUTIONS: lambda: DistributionMatcher(NEARBY, BEAM_WIDTH, 0.0),
-    MatcherName.THESIS: lambda: ThesisMatcher(ThesisMatcherParameters()),
-    MatcherName.GICP: GicpMatcher,
+DISTRIBUTIONS = "DISTRIBUTIONS"
+MATCHERS: Dict[str, Callable[[], Matcher]] = {
+    DISTRIBUTIONS: lambda: DistributionMatcher(NEARBY, BEAM_WIDTH, 0.0),
+    "THESIS": lambda: ThesisMatcher(ThesisMatcherParameters()),
+    "GICP": GicpMatcher,
 }
+"""What makes each of them, by their names in tables."""

@@ -65,17 +65,17 @@ class JudgedRow(NamedTuple):
     holds: bool
 
 
+def _at_most(what: str, value: float, most: float, unit: str = "", form: str = ".0f") -> JudgedRow:
+    return JudgedRow(what, f"{value:{form}}{unit}", f"<= {most:g}{unit}", bool(value <= most))
+
+
 def rows(samples: Sequence[Sample], listener: Listener, printed: str) -> List[JudgedRow]:
     """Return what the samples of a run, a listener, and what all processes printed tell."""
     settled = [one for one in samples if one.hours >= _SETTLED]
-    result = []
-    for name in sorted(samples[-1].held):
-        result += _of_process(name, samples, [one for one in settled if name in one.held])
     halves = samples[: len(samples) // 2], samples[len(samples) // 2 :]
     waiting = [float(np.median([one.waiting for one in half])) for half in halves]
-    disk = samples[-1].disk
     return [
-        *result,
+        *(row for name in sorted(samples[-1].held) for row in _of_process(name, samples, settled)),
         *_of_scans(settled),
         JudgedRow(
             "beams on their way, first and second half",
@@ -84,29 +84,22 @@ def rows(samples: Sequence[Sample], listener: Listener, printed: str) -> List[Ju
             waiting[1] - waiting[0] <= _MORE_WAITING,
         ),
         JudgedRow("beams lost on their way", f"{listener.lost}", "0", not listener.lost),
-        JudgedRow("logs and maps on disk", f"{disk:.1f} MB", f"<= {_MOST_DISK:.0f} MB", disk <= _MOST_DISK),
+        _at_most("logs and maps on disk", samples[-1].disk, _MOST_DISK, " MB", ".1f"),
         *of_errors(listener.internal_errors(), listener.errors_said, printed),
         *_of_log(listener),
         *_of_diagnostics(listener),
-        *_of_fixes(listener),
+        _of_fixes(listener),
     ]
 
 
-def _of_process(name: str, samples: Sequence[Sample], settled: Sequence[Sample]) -> List[JudgedRow]:
-    memory = samples[-1].held[name].memory
-    result = [JudgedRow(f"{name}: memory", f"{memory:.0f} MB", f"<= {_MOST_MEMORY:.0f} MB", memory <= _MOST_MEMORY)]
-    if len(settled) < _FEWEST:
-        return result
-    growth = _growth(name, settled)
-    grown = [
-        getattr(settled[-1].held[name], each) - getattr(settled[0].held[name], each) for each in ("files", "threads")
-    ]
-    return [
-        *result,
-        JudgedRow(f"{name}: growth", f"{growth:+.2f} MB/h", f"<= {_MOST_GROWTH:g} MB/h", growth <= _MOST_GROWTH),
-        JudgedRow(f"{name}: more files", f"{grown[0]:+d}", f"<= {_MORE_FILES}", grown[0] <= _MORE_FILES),
-        JudgedRow(f"{name}: more threads", f"{grown[1]:+d}", f"<= {_MORE_THREADS}", grown[1] <= _MORE_THREADS),
-    ]
+def _of_process(name: str, samples: Sequence[Sample], settled: Sequence[Sample]) -> Iterator[JudgedRow]:
+    yield _at_most(f"{name}: memory", samples[-1].held[name].memory, _MOST_MEMORY, " MB")
+    settled = [one for one in settled if name in one.held]
+    if len(settled) >= _FEWEST:
+        first, last = settled[0].held[name], settled[-1].held[name]
+        yield _at_most(f"{name}: growth", _growth(name, settled), _MOST_GROWTH, " MB/h", "+.2f")
+        yield _at_most(f"{name}: more files", last.files - first.files, _MORE_FILES, form="+d")
+        yield _at_most(f"{name}: more threads", last.threads - first.threads, _MORE_THREADS, form="+d")
 
 
 def _of_scans(settled: Sequence[Sample]) -> Iterator[JudgedRow]:
@@ -118,10 +111,7 @@ def _of_scans(settled: Sequence[Sample]) -> Iterator[JudgedRow]:
     median = float(np.nanmedian([one.match_time for one in settled]))
     cpu = 1e3 * (last.held[_CORE].cpu - first.held[_CORE].cpu) / scans
     kept = 1e3 * _growth(_CORE, settled) * (last.hours - first.hours) / scans
-    yield JudgedRow(
-        f"solver, a scan, median to scan {last.scans}", f"{median:.0f} ms", f"<= {_MOST_MATCH_TIME:g} ms",
-        median <= _MOST_MATCH_TIME,
-    )  # fmt: skip
+    yield _at_most(f"solver, a scan, median to scan {last.scans}", median, _MOST_MATCH_TIME, " ms")
     yield JudgedRow(f"{_CORE}: CPU of a scan, beams to map", f"{cpu:.0f} ms", "", True)
     yield JudgedRow(f"{_CORE}: kept of a scan", f"{kept:+.1f} kB", "", True)
 
@@ -152,40 +142,34 @@ def _in_short(text: str) -> str:
     return " ".join([*_PLACE.findall(text)[-1:], text.strip().splitlines()[-1]])
 
 
-def _of_log(listener: Listener) -> List[JudgedRow]:
-    """Return how many lines each cause had in the hour in which it had most."""
-    per_hour = Counter((line, int(hours)) for hours, line in listener.lines)
+def _of_log(listener: Listener) -> Iterator[JudgedRow]:
+    """Yield how many lines each cause had in the hour in which it had most."""
     most: Dict[str, int] = {}
-    for (line, _), count in per_hour.items():
+    for (line, _), count in Counter((line, int(hours)) for hours, line in listener.lines).items():
         most[line] = max(count, most.get(line, 0))
-    return [
-        JudgedRow(f"log lines in an hour: {line[:60]}", f"{count}", f"<= {_MOST_LINES}", count <= _MOST_LINES)
-        for line, count in sorted(most.items(), key=lambda each: -each[1])
-    ]
+    for line, count in sorted(most.items(), key=lambda each: -each[1]):
+        yield _at_most(f"log lines in an hour: {line[:60]}", count, _MOST_LINES)
 
 
-def _of_diagnostics(listener: Listener) -> List[JudgedRow]:
-    """Return what nodes count beside what the listener counted, and what they complained of."""
+def _of_diagnostics(listener: Listener) -> Iterator[JudgedRow]:
+    """Yield what nodes count beside what the listener counted, and what they complained of."""
     sent, heard = (listener.value(*each) for each in (("sonar_simulator", "beams out"), ("sonar_to_cloud", "beams in")))
-    result = [JudgedRow("sonar_to_cloud: beams in", f"{heard}", f"{sent}, as sonar_simulator sent", sent == heard)]
+    yield JudgedRow("sonar_to_cloud: beams in", f"{heard}", f"{sent}, as sonar_simulator sent", sent == heard)
     for topic, counters in COUNTED.items():
         heard = listener.counts[topic]
         for stage, counter in counters:
             told = listener.value(stage, counter)
-            result.append(JudgedRow(f"{stage}: {counter}", f"{told}", f"{heard}, as on {topic}", told == heard))
-    complaints = [
-        JudgedRow(f"/diagnostics: {text[:60]}", f"{count} s", "not more than the log", True)
-        for text, count in listener.complaints()
-    ]
-    return [*result, *complaints]
+            yield JudgedRow(f"{stage}: {counter}", f"{told}", f"{heard}, as on {topic}", told == heard)
+    for text, count in listener.complaints():
+        yield JudgedRow(f"/diagnostics: {text[:60]}", f"{count} s", "not more than the log", True)
 
 
-def _of_fixes(listener: Listener) -> List[JudgedRow]:
+def _of_fixes(listener: Listener) -> JudgedRow:
     """Return how far fixes were from the truth, and how far they said at most."""
     errors = np.array(listener.errors).reshape(-1, 3)
     if not len(errors):
-        return [JudgedRow("fixes", "0", "some", False)]
+        return JudgedRow("fixes", "0", "some", False)
     last = errors[errors[:, 0] > errors[-1, 0] - 1.0]
     within = float(np.mean(last[:, 1] <= 3.0 * last[:, 2]))
     figures = f"{last[:, 1].mean():.2f} m, {last[:, 1].max():.2f} m at most; told {last[:, 2].mean():.2f} m"
-    return [JudgedRow("error of the last hour's fixes", figures, "within three deviations told", within >= 0.95)]
+    return JudgedRow("error of the last hour's fixes", figures, "within three deviations told", within >= 0.95)

@@ -3,7 +3,7 @@
 from typing import Dict, List
 
 import numpy as np
-from benchmarks.matchers import MatcherName
+from benchmarks.matchers import DISTRIBUTIONS
 from benchmarks.scans import KINDS, ScanMaker, SonarKind
 from matplotlib.axes import Axes
 from scipy.stats import chi2
@@ -43,15 +43,12 @@ def make(pictures: Pictures) -> str:
 
 
 def _last_squares(kind: SonarKind) -> np.ndarray:
-    maker, track = ScanMaker("basin", kind), session_track()
-    found = []
+    """Return the squared error over the stated variance of the last accepted fix of each run that has one."""
+    maker, track, found = ScanMaker("basin", kind), session_track(), []
     for seed in range(SEEDS):
-        errors = session_errors(
-            session_scans(maker, seed, track), matching_estimator(MatcherName.DISTRIBUTIONS, ODOMETRY)
-        )
-        accepted = errors[errors[:, 0] > 0]
-        if len(accepted):
-            found.append(accepted[-1, 3])
+        estimator = matching_estimator(DISTRIBUTIONS, ODOMETRY)
+        errors = session_errors(session_scans(maker, seed, track), estimator)
+        found += errors[errors[:, 0] > 0][-1:, 3].tolist()
     return np.array(found)
 
 

@@ -2,13 +2,14 @@
 
 from dataclasses import dataclass
 from functools import partial
-from typing import Callable, Dict, List, Sequence
+from itertools import product
+from typing import Callable, Dict, Iterator, List, Sequence
 
 import numpy as np
 import yaml
 from benchmarks.harness import ROOT
-from benchmarks.matchers import MATCHERS, MatcherName
-from benchmarks.scans import HEAD, KINDS, ScanMaker, SonarKind, still
+from benchmarks.matchers import DISTRIBUTIONS, MATCHERS
+from benchmarks.scans import HEAD, KINDS, ScanMaker, still
 from matplotlib.axes import Axes
 
 from mlsm_manager.localisation.estimator import Estimator
@@ -42,7 +43,6 @@ _DISPLACED = np.array([0.3, -0.2, np.radians(5.0)])
 """x y [m] and yaw by which a still scan is put beside its place."""
 AT_REST = (2, 4, 6)
 """Turns of the head during which the vehicle rests after each move."""
-SHOWN = MatcherName.DISTRIBUTIONS
 _SHARP, _THESIS = KINDS[0], KINDS[2]
 _REACH = 29.0  # m: both long walls and the gate are in the picture
 _BEFORE, _AFTER = "#d32f2f", "#2e7d32"
@@ -90,7 +90,7 @@ def make(pictures: Pictures) -> str:
     by_chain = {
         kind: [session_scans(maker, seed, track) for seed in range(THESIS_SEEDS)] for kind, maker in makers.items()
     }
-    found = {f"`{one.value}`": fixes(sessions[_SHARP][0], matching_estimator(one, ODOMETRY)) for one in MatcherName}
+    found = {f"`{one}`": fixes(sessions[_SHARP][0], matching_estimator(one, ODOMETRY)) for one in MATCHERS}
     found[WORD] = fixes(by_chain[_THESIS][0], thesis_estimator())
     return joined(
         prose("""The vehicle makes the moves of the thesis in the basin: 4 m on x, 3 m on y and -8 m on x as the
@@ -99,17 +99,17 @@ def make(pictures: Pictures) -> str:
         thesis's own matcher without the faults of its code, `GICP` Open3D's; all three get the same echoes.
         `thesis:=true` matches cleaned clouds of a pulse of 1 m, as the thesis did. The thesis published one
         run."""),
-        _picture(pictures, found[f"`{SHOWN.value}`"]),
+        _picture(pictures, found[f"`{DISTRIBUTIONS}`"]),
         "Corrections of one run, x and y in metres, how far they are from the wanted ones, and the matcher's error:",
         table(["move", "wanted", "thesis", *found], _corrections(found)),
         prose(f"""All scans after the first one, also those taken during the moves, of {SEEDS} runs with other
         noise ({THESIS_SEEDS} runs with `thesis:=true`): how many were accepted, and how far the positions were off,
         median and 95 % (of all matches where none was accepted):"""),
         table(
-            ["", *(f"`{name.value}`" for name in MatcherName), WORD],
+            ["", *(f"`{name}`" for name in MATCHERS), WORD],
             [
                 [
-                    str(kind), *(_summary(runs, partial(matching_estimator, name, ODOMETRY)) for name in MatcherName),
+                    str(kind), *(_summary(runs, partial(matching_estimator, name, ODOMETRY)) for name in MATCHERS),
                     _summary(by_chain[kind], thesis_estimator),
                 ]
                 for kind, runs in sessions.items()
@@ -118,13 +118,8 @@ def make(pictures: Pictures) -> str:
         prose(f"""The static matching of the thesis (6.5.6): a still scan that is put beside its place by 0.3 m on
         x, -0.2 m on y and 5 degrees is matched with the map of another one. Median and greatest of {THESIS_SEEDS} runs;
         the thesis gives no number ("the expected results", 7.4):"""),
-        table(["", "", "off by", "heading", "error"], _static_rows()),
+        table(["", "", "off by", "heading", "error"], list(_static_rows())),
     )  # fmt: skip
-
-
-def _static_rows() -> List[List[str]]:
-    rows = {WORD: thesis_estimator, f"{WORD} with cells of 0.3 m, the code's default": fine_estimator}
-    return [_static_row(kind, *row) for kind in (_SHARP, _THESIS) for row in rows.items()]
 
 
 def displaced_fix(maker: ScanMaker, estimator: Estimator, seed: int) -> MatchResult:
@@ -136,13 +131,16 @@ def displaced_fix(maker: ScanMaker, estimator: Estimator, seed: int) -> MatchRes
     return estimator.add_scan(maker.scan(here, still(_DISPLACED), 2 * seed + 1, 1, track=track)).result
 
 
-def _static_row(kind: SonarKind, name: str, make_estimator: Callable[[], Estimator]) -> List[str]:
-    maker = ThesisScans(kind)
-    results = [displaced_fix(maker, make_estimator(), seed) for seed in range(THESIS_SEEDS)]
-    found = [[np.hypot(*one.pose[:2]), abs(np.degrees(one.pose[2])), one.error] for one in results]
-    (distance, yaw, error), (most, most_yaw, _) = np.median(found, axis=0), np.max(found, axis=0)
-    cells = [f"{distance:.2f} m, {most:.2f} m", f"{yaw:.2f} deg, {most_yaw:.2f} deg", f"{error:.2f} m"]
-    return [str(kind), name, *cells]
+def _static_rows() -> Iterator[List[str]]:
+    estimators = {WORD: thesis_estimator, f"{WORD} with cells of 0.3 m, the code's default": fine_estimator}
+    for kind, (name, make_estimator) in product((_SHARP, _THESIS), estimators.items()):
+        maker = ThesisScans(kind)
+        results = [displaced_fix(maker, make_estimator(), seed) for seed in range(THESIS_SEEDS)]
+        found = [[np.hypot(*one.pose[:2]), abs(np.degrees(one.pose[2])), one.error] for one in results]
+        (distance, yaw, error), (most, most_yaw, _) = np.median(found, axis=0), np.max(found, axis=0)
+        yield [
+            str(kind), name, f"{distance:.2f} m, {most:.2f} m", f"{yaw:.2f} deg, {most_yaw:.2f} deg", f"{error:.2f} m"
+        ]  # fmt: skip
 
 
 def _corrections(found: Dict[str, List[Fix]]) -> List[List[str]]:
@@ -225,7 +223,7 @@ def session_scans(maker: ScanMaker, seed: int, track: Track) -> List[Scan]:
     ]
 
 
-def matching_estimator(name: MatcherName, errors: OdometryErrors) -> ThesisEstimator:
+def matching_estimator(name: str, errors: OdometryErrors) -> ThesisEstimator:
     """Return an estimator that matches with default parameters and knows how wrong the odometry may be."""
     estimator = ThesisEstimator(_SETTINGS, errors, MATCHERS[name]())
     estimator.matching = True

@@ -4,7 +4,7 @@ from functools import partial
 from typing import Callable, List
 
 import numpy as np
-from benchmarks.matchers import MatcherName
+from benchmarks.matchers import MATCHERS
 from benchmarks.scans import HEAD, KINDS, ScanMaker, still
 
 from mlsm_manager.localisation.estimator import Estimator
@@ -30,7 +30,7 @@ def make(_pictures: Pictures) -> str:
     """Return the section."""
     maker = ScanMaker("basin", KINDS[0])
     runs = [moving_scans(maker, seed) for seed in range(SEEDS)]
-    estimators = {f"`{name.value}`": partial(matching_estimator, name, _ERRORS) for name in MatcherName}
+    estimators = {f"`{name}`": partial(matching_estimator, name, _ERRORS) for name in MATCHERS}
     found = {name: [matches(scans, estimator) for scans in runs] for name, estimator in estimators.items()}
     cleaned = ThesisScans(KINDS[0])
     found[WORD] = [matches(moving_scans(cleaned, seed), thesis_estimator) for seed in range(THESIS_SEEDS)]
@@ -87,13 +87,13 @@ def matches(scans: List[Scan], make_estimator: Callable[[], Estimator]) -> List[
     return [estimator.add_scan(scan).result for scan in scans[1:]]
 
 
-def squared_errors(result: MatchResult) -> np.ndarray:
-    """Return (n, 3) squared errors of distance, yaw and speed at every beam of a matched scan."""
-    difference = result.beam_poses - path(result.beam_times)
-    speed = np.full(len(difference), np.hypot(*(result.velocity[:2] - [SPEED, 0.0])))
-    return np.column_stack([(difference[:, :2] ** 2).sum(axis=1), wrapped(difference[:, 2]) ** 2, speed**2])
-
-
 def root_mean_square(results: List[MatchResult]) -> np.ndarray:
-    """Return (3,) root mean squares of the errors over all beams."""
-    return np.sqrt(np.concatenate([squared_errors(result) for result in results]).mean(axis=0))
+    """Return (3,) root mean squares of the errors of distance, yaw and speed over all beams of matched scans."""
+    squares = []
+    for result in results:
+        difference = result.beam_poses - path(result.beam_times)
+        speed = np.full(len(difference), np.hypot(*(result.velocity[:2] - [SPEED, 0.0])))
+        squares.append(
+            np.column_stack([(difference[:, :2] ** 2).sum(axis=1), wrapped(difference[:, 2]) ** 2, speed**2])
+        )
+    return np.sqrt(np.concatenate(squares).mean(axis=0))

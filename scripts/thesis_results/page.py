@@ -86,16 +86,12 @@ def write_page(path: Path, sections: Sequence[Section], made: Mapping[str, str])
 
 
 def _contents(sections: Sequence[Section]) -> str:
-    rows = [
-        [f"[{section.heading}](#{_anchor(section.heading)})", f"`{section.word}`", ", ".join(section.recordings)]
-        for section in sections
-    ]
+    rows = []
+    for section in sections:
+        # As GitHub makes the anchor of a heading.
+        anchor = re.sub(r"[^\w\- ]", "", section.heading.lower()).replace(" ", "-")
+        rows.append([f"[{section.heading}](#{anchor})", f"`{section.word}`", ", ".join(section.recordings)])
     return table(["section", "word for `scripts/results`", "real recordings"], rows)
-
-
-def _anchor(heading: str) -> str:
-    """Return the anchor that GitHub makes of a heading."""
-    return re.sub(r"[^\w\- ]", "", heading.lower()).replace(" ", "-")
 
 
 def made_with(seconds: float) -> str:

@@ -41,8 +41,17 @@ class Pictures:
         self._page = page
 
     def save(self, name: str, figure: Figure, what: str) -> str:
-        """Write NAME.png and return the Markdown that shows it, with `what` it shows below."""
-        return self._write(name, _small_png(figure), what)
+        """Write NAME.png and return the Markdown that shows it, with `what` it shows below.
+
+        It gets the best resolution that fits. Raises ValueError where even the coarsest is too large.
+        """
+        for resolution in _RESOLUTIONS:
+            full = BytesIO()
+            figure.savefig(full, format="png", dpi=resolution, facecolor="white", bbox_inches="tight")
+            png = _in_few_colours(full.getvalue())
+            if len(png) <= MOST_BYTES:
+                return self._write(name, png, what)
+        raise ValueError(f"a picture of {len(png)} bytes at {resolution} dpi, must be {MOST_BYTES} or less")
 
     def copied(self, name: str, file: Path, what: str) -> str:
         """Write a picture that a program made to NAME.png, in fewer colours, and return its Markdown as `save` does."""
@@ -52,8 +61,8 @@ class Pictures:
         self._folder.mkdir(parents=True, exist_ok=True)
         path = self._folder / f"{name}.png"
         write_whole(path, png)
-        what = prose(what)
-        return f"![{name.replace('_', ' ')}]({path.relative_to(self._page.parent).as_posix()})\n\n*{what}*"
+        shown = path.relative_to(self._page.parent).as_posix()
+        return f"![{name.replace('_', ' ')}]({shown})\n\n*{prose(what)}*"
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1) -> Tuple[Figure, np.ndarray]:
@@ -67,21 +76,6 @@ def to_scale(axes: Axes, title: str, reach: float, middle: Sequence[float] = (0.
     """Make one metre as long in x as in y, and show `reach` [m] around `middle` [m]."""
     axes.set(aspect="equal", title=title, xlabel="x, m", ylabel="y, m")
     axes.set(xlim=(middle[0] - reach, middle[0] + reach), ylim=(middle[1] - reach, middle[1] + reach))
-
-
-def _small_png(figure: Figure) -> bytes:
-    """Raise ValueError where even the coarsest resolution is too large."""
-    for resolution in _RESOLUTIONS:
-        data = _png(figure, resolution)
-        if len(data) <= MOST_BYTES:
-            return data
-    raise ValueError(f"a picture of {len(data)} bytes at {resolution} dpi, must be {MOST_BYTES} or less")
-
-
-def _png(figure: Figure, resolution: int) -> bytes:
-    full = BytesIO()
-    figure.savefig(full, format="png", dpi=resolution, facecolor="white", bbox_inches="tight")
-    return _in_few_colours(full.getvalue())
 
 
 def _in_few_colours(png: bytes) -> bytes:

@@ -2,7 +2,7 @@
 
 import math
 from dataclasses import dataclass, replace
-from typing import List
+from typing import Dict, List
 
 import numpy as np
 from benchmarks.harness import ROOT, recorded_beams
@@ -113,37 +113,27 @@ def _turn(chain: ThesisChain) -> Cloud:
 
 @dataclass(frozen=True)
 class Processed:
-    """A scan after each stage, taken from `place` (2,) m.
+    """A scan after each stage, by its name, taken from `place` (2,) m.
 
     otsu, threshold: Otsu's threshold, and the one that the default mode makes of it.
     """
 
     place: np.ndarray
-    raw: Cloud
-    thresholded: Cloud
-    cleaned: Cloud
+    stages: Dict[str, Cloud]
     lines: List[Line]
     otsu: float
     threshold: float
 
-    @property
-    def stages(self) -> dict:
-        """Name of each stage and its cloud."""
-        return {"raw": self.raw, "thresholded": self.thresholded, "cleaned": self.cleaned}
-
 
 def processed(raw: Cloud, place: np.ndarray, lines: LineDetectorParameters, chain: ThesisChain = DEFAULTS) -> Processed:
     """Return what the stages of a chain, by default with their defaults, and the line detector make of a scan."""
-    parameters = chain.threshold
-    plain = replace(parameters, mode=ThresholdMode.OTSU, min_threshold=0.0)
-    otsu, thresholder = Thresholder(plain), Thresholder(parameters)
+    otsu = Thresholder(replace(chain.threshold, mode=ThresholdMode.OTSU, min_threshold=0.0))
+    thresholder = Thresholder(chain.threshold)
     otsu(raw)
     thresholded = thresholder(raw)
     cleaned = OutlierRemover(chain.outliers)(thresholded)
-    return Processed(
-        place, raw, thresholded, cleaned, LineDetector(lines)(cleaned), otsu.newest_threshold,
-        thresholder.newest_threshold,
-    )  # fmt: skip
+    stages = {"raw": raw, "thresholded": thresholded, "cleaned": cleaned}
+    return Processed(place, stages, LineDetector(lines)(cleaned), otsu.newest_threshold, thresholder.newest_threshold)
 
 
 def draw_stages(pictures: Pictures, name: str, scan: Processed, reach: float, what: str) -> str:
@@ -152,7 +142,8 @@ def draw_stages(pictures: Pictures, name: str, scan: Processed, reach: float, wh
     for cell, (stage, cloud) in zip(axes, scan.stages.items()):
         _draw_cloud(cell, cloud)
         to_scale(cell, f"{stage}: {np.count_nonzero(cloud.valid)} points", reach, scan.place)
-    points = scan.cleaned.points[scan.cleaned.valid]
+    cleaned = scan.stages["cleaned"]
+    points = cleaned.points[cleaned.valid]
     axes[3].plot(points[:, 0], points[:, 1], ".", color="#bbbbbb", markersize=1.5)
     for line in scan.lines:
         axes[3].plot(*line.ends.T, color="#c2185b", linewidth=2.0)
@@ -177,13 +168,11 @@ def _rows(found: List[Processed], world: World) -> List[List[str]]:
         ["threshold that was used", *(f"{scan.threshold:.0f}" for scan in found)],
     ]
     for stage in found[0].stages:
-        shares = [_share_on_surfaces(scan.stages[stage], world) for scan in found]
+        shares = []
+        for scan in found:
+            # Points are drawn at the depth of the sonar, also those of no strength.
+            points = scan.stages[stage].points[scan.stages[stage].valid]
+            shares.append(np.mean(distances(world, points[points[:, 3] > 0, :3]) <= _ON))
         rows.append([f"echoes within {_ON:g} m of a surface, {stage}", *(f"{100.0 * share:.0f} %" for share in shares)])
     rows.append(["walls", *(str(len(scan.lines)) for scan in found)])
     return rows
-
-
-def _share_on_surfaces(cloud: Cloud, world: World) -> float:
-    """Return the share of points with any strength that lie on a surface; they are drawn at the depth of the sonar."""
-    points = cloud.points[cloud.valid]
-    return float(np.mean(distances(world, points[points[:, 3] > 0, :3]) <= _ON))

@@ -1,6 +1,6 @@
 """7: what `thesis:=true` sets, beside the defaults of the package; printed too."""
 
-from typing import Any, Dict, List, Mapping
+from typing import Any, List, Mapping
 
 import yaml
 from document import LIVE_NODES
@@ -32,12 +32,9 @@ def _rows(node: str, values: Mapping[str, Any]) -> List[List[str]]:
     if node == _SIMULATOR:
         ours, told = LaserConeParameters().to_mapping(), values["laser_cone"]
     else:
-        ours, told = LIVE_NODES[node]().to_mapping(), _flat(values)
+        ours = LIVE_NODES[node]().to_mapping()
+        told = {**{name: value for name, value in values.items() if name != EXPERT}, **values.get(EXPERT, {})}
     return [[node, f"`{name}`", _text(ours[name]), _text(value)] for name, value in told.items()]
-
-
-def _flat(values: Mapping[str, Any]) -> Dict[str, Any]:
-    return {**{name: value for name, value in values.items() if name != EXPERT}, **values.get(EXPERT, {})}
 
 
 def _text(value: Any) -> str:

@@ -1,7 +1,7 @@
 """7.1: what the echo models hear in the worlds, and beside it what real heads heard."""
 
 import math
-from typing import Dict, List, NamedTuple
+from typing import Dict, List
 
 import numpy as np
 import yaml
@@ -31,19 +31,8 @@ _BANDS = np.arange(0.5, 10.01, 0.5)
 """Range bands [m] whose histograms are compared. Nearer than half a metre stands a part of the vehicle."""
 
 
-class View(NamedTuple):
-    """A world, where the sonar is in it [m], and the sonar's range [m]."""
-
-    world: str
-    place: tuple
-    reach: float
-
-
-_VIEWS = (
-    View("basin", (-20.0, -3.0, -2.0), 50.0),
-    View("harbour", (-5.0, -5.0, -2.0), 50.0),
-    View("tank", (0.0, 0.0, -1.0), 10.0),
-)
+_VIEWS = {"basin": ((-20.0, -3.0, -2.0), 50.0), "harbour": ((-5.0, -5.0, -2.0), 50.0), "tank": ((0.0, 0.0, -1.0), 10.0)}
+"""The worlds, where the sonar is in each [m], and its range [m]."""
 _BEAMS = 120
 _PLACE_852, _REACH_852 = (-20.0, -20.0, -2.0), 50.0
 _SETTINGS_852 = {
@@ -57,7 +46,7 @@ _SETTINGS_852 = {
 def make_simulated(pictures: Pictures) -> str:
     """Return the section of what the models hear."""
     figure, axes = new_figure(15.0, 11.0, len(_VIEWS), 1 + len(ECHO_MODELS))
-    for row, (name, place, reach) in zip(axes, _VIEWS):
+    for row, (name, (place, reach)) in zip(axes, _VIEWS.items()):
         world = load_world(ROOT / f"worlds/{name}.sdf")
         draw_world(row[0], world, place)
         row[0].plot(0.0, 0.0, "r.")
@@ -171,14 +160,10 @@ def _difference(one: Turn, other: Turn) -> float:
     edges = np.rint(_BANDS * one.strengths.shape[1] / _REACH).astype(int)
     found = []
     for low, high in zip(edges[:-1], edges[1:]):
-        shares, others = (_shares(turn.strengths[:, low:high]) for turn in (one, other))
+        samples = [turn.strengths[:, low:high].ravel() for turn in (one, other)]
+        shares, others = (np.cumsum(np.bincount(each, minlength=256)) / each.size for each in samples)
         found.append(np.abs(shares - others).max())
     return float(np.mean(found))
-
-
-def _shares(strengths: np.ndarray) -> np.ndarray:
-    """Return the share of samples at or below each strength."""
-    return np.cumsum(np.bincount(strengths.ravel(), minlength=256)) / strengths.size
 
 
 def _draw_medians(axes: Axes, turns: Dict[str, Turn]) -> None:

@@ -53,13 +53,19 @@ def make(pictures: Pictures) -> str:
         at ({_PLACE[0]:g}, {_PLACE[1]:g}, {_PLACE[2]:g}) m, in the corner of the quays of `worlds/harbour.sdf`. Compare
         with figures 7.5 and 7.6 of the thesis: near walls fuse into blocks of their whole height, and far ones are
         seen as stripes, one for each step of the servo."""),
-        *(_shown(pictures, f"survey_{number}", name, found[name]) for number, name in enumerate(found, start=1)),
+        *(
+            pictures.save(
+                f"survey_{number}", drawn_in_space(blocks, *_SEEN_FROM),
+                f"{name.capitalize()}: {len(blocks)} blocks. Light yellow: vertical, red: horizontal.",
+            )
+            for number, (name, blocks) in enumerate(found.items(), start=1)
+        ),
         table(["", *found, _THESIS], _rows([*found.values(), by_thesis], world)),
         prose("""Distances are those of the worst of each block's mean, top and bottom from the nearest surface of
         the world; "within one cell" is that of each map. The thesis gives no numbers for figures 7.5 and 7.6. A fan
         beam tells nothing about the height of its echoes: see [which head for
         heights](sonar_control.md#which-head-for-heights)."""),
-    )
+    )  # fmt: skip
 
 
 def surveyed(
@@ -91,11 +97,6 @@ def surveyed(
             cloud = remove(threshold(cloud))
             surface_map.insert(cloud.points[cloud.valid])
     return surface_map.blocks
-
-
-def _shown(pictures: Pictures, file: str, name: str, blocks: Blocks) -> str:
-    what = f"{name.capitalize()}: {len(blocks)} blocks. Light yellow: vertical, red: horizontal."
-    return pictures.save(file, drawn_in_space(blocks, *_SEEN_FROM), what)
 
 
 def _rows(found: List[Blocks], world: World) -> List[List[str]]:
