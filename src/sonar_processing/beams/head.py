@@ -59,7 +59,7 @@ class HeadTurn:
 class SweepCounter:
     """Counts beams until the head has turned full circle, or has reversed at both ends of a sector."""
 
-    def __init__(self, scan_beams: int = 0) -> None:
+    def __init__(self, scan_beams: int) -> None:
         """`scan_beams`: beams that make a scan whatever the head does; 0: the head's angle tells."""
         self.beams = 0
         self._scan_beams = scan_beams

@@ -60,10 +60,6 @@ def test_the_first_and_the_last_allowed_number_of_bins_are_taken(bins):
     assert len(_beam(bins).ranges) == bins
 
 
-def test_ranges_are_those_of_the_bins_centres():
-    np.testing.assert_allclose(_beam(4, range_resolution=0.5).ranges, (0.25, 0.75, 1.25, 1.75))
-
-
 @pytest.mark.parametrize("stamps", [0, 2, 4])
 def test_a_cloud_has_as_many_stamps_as_points(stamps):
     with pytest.raises(RefusedInput, match=f"3 points but {stamps} time stamps") as refused:
@@ -89,20 +85,6 @@ def test_points_beyond_a_limit_are_told_from_those_that_were_removed():
     cloud = cloud_of([1, 2, 3, 4, 5])
     cloud.points[:, 1] = 100.0, -100.1, 3e38, np.nan, -np.inf
     assert cloud.beyond(100.0).tolist() == [False, True, True, False, True]
-
-
-def test_selected_points_keep_their_stamps():
-    selected = cloud_of([10, 20, 30]).select(np.array([True, False, True]))
-    assert selected.points[:, 3].tolist() == [10, 30]
-    assert selected.time_stamps.tolist() == [1, 3]
-
-
-def test_an_organised_cloud_keeps_its_shape_when_points_are_selected():
-    selected = cloud_of([10, 20, 30, 40], height=2).select(np.array([True, False, True, False]))
-    assert selected.is_organized
-    assert np.isnan(selected.points[:, 0]).tolist() == [False, True, False, True]
-    assert selected.time_stamps.tolist() == [1, 2, 3, 4]
-    assert selected.points.dtype == np.float32
 
 
 def _projected(beam, pose=IDENTITY, sides=1, width=0.0436):
