@@ -9,21 +9,20 @@ from typing import Callable, Dict, List, Optional, Tuple
 
 import rospy
 import tf2_ros
-from geometry_msgs.msg import Quaternion, TransformStamped, Vector3
+from geometry_msgs.msg import Transform, TransformStamped
+from std_msgs.msg import Header
 
 from node_support.errors import RefusedInput
-from node_support.geometry import quaternion_of
 from node_support.headers import JUMP_BACK
 from node_support.health import Health
 from node_support.ros.callbacks import guarded, on_change
-from node_support.ros.transforms import TfBuffer
+from node_support.ros.transforms import TfBuffer, pose_from_matrix
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.beam_queue import BeamQueue, WaitingBeam
 from sonar_processing.beams.parameters import MountingParameters
 
 _PATIENCE = 0.5  # s: whoever knows the frame and has started sends it at once, because /tf_static is latched
 _FEWEST = 10  # Beams of one frame that wait: a few may be broken messages
-
 _CACHE = 180.0  # s that tf remembers: longer than the beams that wait, also while a busy machine takes none of them
 
 
@@ -54,12 +53,10 @@ class SonarMount:
 
     def _mount(self, frame: str) -> None:
         one = self._parameters
-        pose, mount = one.matrix(), TransformStamped(child_frame_id=frame)
-        mount.header.frame_id = one.mounted_in
-        mount.transform.translation = Vector3(*pose[:3, 3])
-        mount.transform.rotation = Quaternion(*quaternion_of(pose))
+        pose = pose_from_matrix(one.matrix())
+        transform = Transform(pose.position, pose.orientation)
         self._broadcaster = tf2_ros.StaticTransformBroadcaster()
-        self._broadcaster.sendTransform(mount)
+        self._broadcaster.sendTransform(TransformStamped(Header(frame_id=one.mounted_in), frame, transform))
         rospy.logwarn(
             "%s: tf does not know %s: it is mounted in %s at %g %g %g m, yaw %g rad%s, as mount_* say",
             self._name, frame, one.mounted_in, one.mount_x, one.mount_y, one.mount_z, one.mount_yaw,
@@ -95,7 +92,7 @@ class TransformFilter:
         self._newest_ns: Optional[int] = None
         self._jumped = False
         self._has_placed = False
-        with self._lock:  # so that no delivery looks for tf before it is there
+        with self._lock:  # No delivery may look for tf before it is there
             self._notify = on_change(0.0, self._deliver_ready, health)
             self._transforms = TfBuffer(health, _CACHE, stamp_tolerance, self._notify, target_frame)
 
