@@ -41,7 +41,7 @@ from mlsm_manager.offline.trust import Trust
 from mlsm_manager.report.mission import Path as Trajectory
 from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import beam_causes, ranges_are_told
-from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault, Suspicion
+from mlsm_manager.self_check.causes import CERTAIN, Assumption, Cause, Fault
 from mlsm_manager.self_check.companions import without_companions
 from mlsm_manager.self_check.course import NOT_TOLD
 from mlsm_manager.self_check.echo_causes import echo_findings, put_right
@@ -167,8 +167,8 @@ def _refined(
         return None
     suspected = [*suspected, *(cause.fault for cause in causes if cause.fault is not None)]
     with progress_bar(parts_of_refining(replayed.rivals), "part", "refine") as bar:
-        suspicion = Suspicion(suspected, ranges_are_told(recording.sent))
-        return refine(replayed, recording.track, parameters.map_settings(), suspicion, bar.update)
+        are_told, settings = ranges_are_told(recording.sent), parameters.map_settings()
+        return refine(replayed, recording.track, settings, suspected, are_told, bar.update)
 
 
 def _judged(

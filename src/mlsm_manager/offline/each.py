@@ -16,7 +16,7 @@ from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Tupl
 import numpy as np
 import scipy
 
-from mlsm_manager.offline.index_page import Job, Outcome, index_page
+from mlsm_manager.offline.index_page import Outcome, index_page
 from node_support.errors import needed
 from node_support.files import make_folder, write_whole
 from recordings.bags.bag import RecordingError
@@ -157,9 +157,9 @@ def map_each(
     """
     make_folder(out)
     jobs = _jobs(recordings, out)
-    outcomes: Dict[Job, Outcome] = {}
+    outcomes: Dict[Tuple[Path, Path], Outcome] = {}
     with ThreadPoolExecutor(at_once or os.cpu_count()) if scheduler is None else Cluster(scheduler, out) as workers:
-        running = {workers.submit(_mapped, job, options) for job in jobs}
+        running = {workers.submit(_mapped, *job, options) for job in jobs}
         try:
             while running:
                 done, running = wait(running, _LOOK, FIRST_COMPLETED)
@@ -167,8 +167,8 @@ def map_each(
                     workers.check(f"{len(outcomes)} of {len(jobs)} recordings are done and stay")
                 for one in done:
                     outcome = one.result()
-                    outcomes[outcome.job] = outcome
-                    line = f"{len(outcomes)}/{len(jobs)} {outcome.job.recording}: {outcome.problem or 'mapped'}"
+                    outcomes[outcome[:2]] = outcome
+                    line = f"{len(outcomes)}/{len(jobs)} {outcome.recording}: {outcome.problem or 'mapped'}"
                     print(line, flush=True)
                     page = index_page([outcomes[job] for job in jobs if job in outcomes], len(jobs))
                     write_whole(out / INDEX, page.encode())
@@ -179,28 +179,28 @@ def map_each(
     return [outcomes[job] for job in jobs]
 
 
-def _jobs(recordings: Sequence[Path], out: Path) -> List[Job]:
-    """Return a job for each recording; of equal names the second and further ones get a number."""
+def _jobs(recordings: Sequence[Path], out: Path) -> List[Tuple[Path, Path]]:
+    """Return each recording with the folder of its map; of equal names the second and further ones get a number."""
     taken, jobs = Counter(), []
     for recording in recordings:
         name = recording.stem
         taken[name] += 1
-        jobs.append(Job(recording.absolute(), out.absolute() / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
+        jobs.append((recording.absolute(), out.absolute() / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
     return jobs
 
 
-def _mapped(job: Job, options: Sequence[str]) -> Outcome:
+def _mapped(recording: Path, folder: Path, options: Sequence[str]) -> Outcome:
     """Run map_bag for one recording, unless its map is there; its messages stand in its folder."""
-    if not all((job.folder / name).is_file() for name in (_SUMMARY, _MESSAGES)):
-        make_folder(job.folder)
-        words = [sys.executable, "-c", _PROGRAM, str(job.recording), "--out", str(job.folder), *options]
+    if not all((folder / name).is_file() for name in (_SUMMARY, _MESSAGES)):
+        make_folder(folder)
+        words = [sys.executable, "-c", _PROGRAM, str(recording), "--out", str(folder), *options]
         found = {**os.environ, "PYTHONPATH": os.pathsep.join(filter(None, sys.path))}
         done = subprocess.run(words, env=found, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
         if done.returncode:
-            return Outcome(job, {}, _problem(done))
+            return Outcome(recording, folder, {}, _problem(done))
         # Last, for a folder without it is mapped anew.
-        write_whole(job.folder / _MESSAGES, done.stdout)
-    return Outcome(job, json.loads((job.folder / _SUMMARY).read_text()), "")
+        write_whole(folder / _MESSAGES, done.stdout)
+    return Outcome(recording, folder, json.loads((folder / _SUMMARY).read_text()), "")
 
 
 def _problem(done: "subprocess.CompletedProcess[bytes]") -> str:

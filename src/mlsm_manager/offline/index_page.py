@@ -21,17 +21,11 @@ _COLORS = {
 }
 
 
-class Job(NamedTuple):
-    """One recording and the folder of its map."""
+class Outcome(NamedTuple):
+    """What became of a recording: the folder of its map, its summary, empty where there is no map, and why that is."""
 
     recording: Path
     folder: Path
-
-
-class Outcome(NamedTuple):
-    """What became of a job: its summary, empty where there is no map, and one line that says why."""
-
-    job: Job
     summary: Dict[str, Any]
     problem: str
 
@@ -56,13 +50,13 @@ def _badge(answer: str) -> str:
 
 
 def _row(outcome: Outcome) -> str:
-    folder, own = outcome.job.folder, outcome.summary
+    folder, own = outcome.folder, outcome.summary
     link, picture = html.escape(folder.name), ""
     if own:
         page = REPORT if (folder / REPORT).is_file() else ""
         shown = f'<img loading="lazy" alt="map of {link}" src="{link}/{PICTURE}">'
         picture = f'<a href="{link}/{page}">{shown}</a><small><a href="{link}/">files</a></small>'
-    name, place = html.escape(outcome.job.recording.name), html.escape(str(outcome.job.recording.parent))
+    name, place = html.escape(outcome.recording.name), html.escape(str(outcome.recording.parent))
     told = "".join(f"<p>{html.escape(line)}</p>" for line in _lines(outcome))
     return f"<tr><td>{picture}</td><td><p>{_badge(outcome.answer)} {name}</p>{told}<small>{place}</small></td></tr>\n"
 

@@ -1,7 +1,7 @@
 """Fits a whole run after it is over, draws its map anew, and fits again to see whether the path depends on settings."""
 
 from dataclasses import dataclass, replace
-from typing import Callable, List, Mapping
+from typing import Callable, List, Mapping, Sequence
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from mlsm_manager.localisation.keyframe_map import KeyframeMap, MapSettings
 from mlsm_manager.localisation.odometry_profiles import fitted
 from mlsm_manager.offline.replay import Replayed
 from mlsm_manager.scan_matching.scan import MapCloud, Track
-from mlsm_manager.self_check.causes import Suspicion
+from mlsm_manager.self_check.causes import Fault
 from mlsm_manager.self_check.fault_trials import without_faults
 from mlsm_manager.self_check.motion_findings import MotionFindings
 from mlsm_manager.self_check.other_places import with_other_places
@@ -49,13 +49,13 @@ def parts_of_refining(rivals: RivalSolvers) -> int:
 
 
 def refine(
-    replayed: Replayed, track: Track, settings: MapSettings, suspicion: Suspicion,
-    done: Done = lambda: None,
+    replayed: Replayed, track: Track, settings: MapSettings, suspected: Sequence[Fault], ranges_told: bool,
+    done: Done,
 ) -> Refined:  # fmt: skip
     """Return the run of all scans that the solvers have taken, fitted at once; live runs are where fits begin.
 
-    Of several odometries the likelier one is believed from then on. suspicion: of sonar or odometry, which said
-    `track`.
+    Of several odometries the likelier one is believed from then on. suspected: of sonar or odometry, which said
+    `track`; see without_faults.
     """
     rivals = replayed.rivals
     fits = []
@@ -66,7 +66,7 @@ def refine(
     closing = with_loops_closed(solver, best)
     done()
     run = solver.solution.with_state(closing.batch.state)
-    motion = with_other_places(without_faults(run, closing.batch, track, suspicion))
+    motion = with_other_places(without_faults(run, closing.batch, track, suspected, ranges_told))
     done()
     surfaces = KeyframeMap(settings.resolution, settings.limit, carver=settings.carver)
     for scan in replayed.scans:

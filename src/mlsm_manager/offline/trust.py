@@ -19,9 +19,9 @@ _MATTERS = 1.2  # times as large a deviation: less is not worth a doubt
 class Trust:
     """verdicts: of all checks. times: (k,) s. covariances: (k, 2, 2) m^2 of the position in map, as stated then.
 
-    matched: scans that were compared with others. causes: of what is wrong, ranked. assumed: what nobody measured and
-    the path rests on. if_so: m, the largest deviation if that is so; NaN where nothing tells. untold: a clause of what
-    no check of such a run can tell, or nothing.
+    matched: scans that were compared with the surfaces of others. causes: of what is wrong, ranked. assumed: what
+    nobody measured and the path rests on, if anything. if_so: m, the largest deviation if that is so; NaN where nothing
+    tells. untold: a clause of what no check of such a run can tell; empty where there is nothing such.
     """
 
     verdicts: List[Verdict]

@@ -75,8 +75,10 @@ class Mission:
     """Everything that the report shows.
 
     title: names of the recordings. headline: whether the run can be trusted. paths: the first is the odometry, the last
-    one the best. scans: oldest first, at least one. calibration: name -> (value, deviation). facts: for the head of the
-    page. further: ways of further recordings, which are shown in the map only. origin: where the map lies, if known.
+    one the best. scans: oldest first, at least one. verdicts: of all checks; none where none was made.
+    calibration: name -> (value, deviation). facts: name -> value, for the head of the page. parameters: name -> value.
+    further: ways of further recordings, which are shown in the map only. origin: where the map lies, if that is known.
+    answer: how it came out.
     """
 
     title: str

@@ -21,15 +21,6 @@ _AGAIN = (FaultKind.STUCK, *TURNED)
 Fault = Union[MotionFault, SonarFault]
 
 
-class Suspicion(NamedTuple):
-    """faults: that pairs of scans and beams show. ranges_told: whether messages tell changes of the range setting: no
-    other ones are looked for.
-    """
-
-    faults: Sequence[Fault]
-    ranges_told: bool = False
-
-
 def is_same(one: Optional[Fault], other: Fault) -> bool:
     """Return whether two faults are one: of most kinds a run has one only, but a compass may stick or step again."""
     return one is not None and one.kind is other.kind and (one.kind not in _AGAIN or one.begin == other.begin)

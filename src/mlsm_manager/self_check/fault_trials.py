@@ -30,7 +30,7 @@ from mlsm_manager.joint_solver.sonar_trials import (
 )
 from mlsm_manager.odometry.faults import OF_DISTANCES, OF_STAMPS, TURNED, FaultKind, MotionFault, likely_faults
 from mlsm_manager.scan_matching.scan import Track
-from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, Suspicion, is_same, unsure_length
+from mlsm_manager.self_check.causes import CERTAIN, NAMED_FROM, Cause, Fault, is_same, unsure_length
 from mlsm_manager.self_check.delays import LATE_BY
 from mlsm_manager.self_check.motion_findings import MotionFindings
 
@@ -83,13 +83,17 @@ class _Trial(NamedTuple):
 _GAIN = attrgetter("gain")
 
 
-def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Suspicion) -> MotionFindings:
+def without_faults(
+    run: Solution, fit: BatchResult, track: Track, suspected: Sequence[Fault], ranges_told: bool = False
+) -> MotionFindings:  # fmt: skip
     """Return what speaks against sonar and odometry `track` of a run that is fitted as `fit` says, and the run without.
+
+    suspected: what pairs of scans and beams show. ranges_told: whether messages tell changes of the range setting: no
+    other ones are looked for.
 
     Each fault is taken out and the run fitted again; the one with which echoes agree best is named. What a fit finds
     besides that lets the odometry err makes the position uncertain.
     """
-    suspected = suspicion.faults
     found, are_few = MotionFindings(run, fit, track), len(fit.node_times) < _FEWEST
     if run.parameters.node_search is not None or not found.is_told or (are_few and not suspected):
         return found
@@ -102,7 +106,7 @@ def without_faults(run: Solution, fit: BatchResult, track: Track, suspicion: Sus
             return found
         places = errors.places
         faults = suspected if are_few else [*_likely(errors), *suspected, *_of_sonar(found)]
-        faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not suspicion.ranges_told]
+        faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not ranges_told]
         if len(found.causes) == _FAULTS or not faults:
             break
         best, rival = _best(found, faults)

@@ -20,7 +20,6 @@ from mlsm_manager.self_check.causes import (
     Assumption,
     Cause,
     Fault,
-    Suspicion,
     of_steps,
     of_stuck,
     ranked,
@@ -215,7 +214,7 @@ def _motion_of(run: Solution, suspected: Sequence[Fault], newest: _Newest, befor
     before: what its course told before.
     """
     track = run.log.odometry.track_from(-np.inf)
-    motion = with_other_places(without_faults(run, fit_of(run), track, Suspicion(suspected)))
+    motion = with_other_places(without_faults(run, fit_of(run), track, suspected))
     solved, first = track.with_poses(motion.run.path(track.times)), run.log.node_times[:1]
     # A part of a run is solved about its own first place.
     apart = (solved.at(first) - newest.track.with_poses(newest.path).at(first))[0, :2]

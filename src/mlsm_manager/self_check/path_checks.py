@@ -26,9 +26,11 @@ def against_odometry(
 ) -> Tuple[Verdict, Verdict]:
     """Return verdicts on the distances along and across the odometry's, in standard deviations of the odometry.
 
-    A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step.
+    A matcher that is dragged along a featureless canal finds a path that is too short, and is sure of every step. The
+    odometry's scale is known far better than that.
 
-    scale_deviation and position_walk [m/sqrt(s)]: of the odometry.
+    times: (m,) s. odometry, corrected: (m, >= 2) positions. scale_deviation and position_walk [m/sqrt(s)]: of the
+    odometry.
     """
     starts = np.arange(times[0], times[-1] - _WINDOW, _STEP)
     paths = (path[:, 0] + 1j * path[:, 1] for path in (odometry, corrected))

@@ -8,7 +8,7 @@ import pytest
 from programs import ROOT
 
 from mlsm_manager.offline.each import INDEX, Cluster, map_each, options_of_one, recordings_in
-from mlsm_manager.offline.index_page import Job, Outcome
+from mlsm_manager.offline.index_page import Outcome
 from mlsm_manager.self_check.verdict import RunAnswer
 from recordings.bags.bag import RecordingError
 
@@ -80,8 +80,7 @@ def test_a_bad_recording_costs_no_other_and_a_map_that_is_there_stays(tmp_path, 
     ],
 )
 def test_the_page_says_of_each_recording_what_its_own_summary_says(summary, answer):
-    outcome = Outcome(Job(Path("a.bag"), Path("a")), summary, "")
-    assert outcome.answer == answer
+    assert Outcome(Path("a.bag"), Path("a"), summary, "").answer == answer
 
 
 def test_a_cluster_that_is_not_there_is_told_before_the_first_map(tmp_path, monkeypatch):
@@ -102,16 +101,19 @@ def test_a_cluster_without_workers_ends_in_one_line_and_says_what_stays(tmp_path
     with Cluster(cluster.scheduler_address, tmp_path) as workers:
         workers.check("all stays")
         cluster.scale(0)
-        with pytest.raises(RecordingError, match="all workers are lost; 3 of 5 stay, and the same command goes on"):
-            check_for_a_minute(workers)
+        assert_told_within_a_minute(workers, "all workers are lost")
 
 
 @pytest.mark.long
 def test_a_lost_scheduler_ends_in_one_line_and_says_what_stays(tmp_path, cluster):
     with Cluster(cluster.scheduler_address, tmp_path) as workers:
         cluster.close()
-        with pytest.raises(RecordingError, match="the scheduler is lost; 3 of 5 stay, and the same command goes on"):
-            check_for_a_minute(workers)
+        assert_told_within_a_minute(workers, "the scheduler is lost")
+
+
+def assert_told_within_a_minute(workers, lost):
+    with pytest.raises(RecordingError, match=f"{lost}; 3 of 5 stay, and the same command goes on"):
+        check_for_a_minute(workers)
 
 
 def check_for_a_minute(workers):

@@ -121,24 +121,17 @@ def command_line(*words):
     return map_bag_arguments(["a.bag", "--out", "out", *words])
 
 
-def refusal(capsys, *words):
-    with pytest.raises(SystemExit) as ended:
-        command_line(*words)
-    assert ended.value.code == 2
-    return capsys.readouterr().err.splitlines()[-1]
-
-
-@pytest.mark.parametrize("odometry", [(), ("--odometry", "none")])
-def test_an_unknown_motion_means_no_odometry(odometry):
-    options = command_line("--unknown-motion", *odometry)
-    assert options.odometry is OdometryKind.NONE
-    assert options.request.motion.declared is MotionSource.UNKNOWN
-
-
-def test_standing_leaves_the_odometry_to_the_recording():
-    options = command_line("--standing")
-    assert options.odometry is None
-    assert options.request.motion.declared is MotionSource.STANDING
+@pytest.mark.parametrize(
+    ("words", "declared", "odometry"),
+    [
+        ("--unknown-motion", MotionSource.UNKNOWN, OdometryKind.NONE),
+        ("--unknown-motion --odometry none", MotionSource.UNKNOWN, OdometryKind.NONE),
+        ("--standing", MotionSource.STANDING, None),
+    ],
+)
+def test_an_unknown_motion_means_no_odometry_and_standing_leaves_it_to_the_recording(words, declared, odometry):
+    options = command_line(*words.split())
+    assert (options.request.motion.declared, options.odometry) == (declared, odometry)
 
 
 @pytest.mark.parametrize(
@@ -150,4 +143,7 @@ def test_standing_leaves_the_odometry_to_the_recording():
     ],
 )
 def test_motions_that_contradict_each_other_are_refused(capsys, words, reason):
-    assert re.search(reason, refusal(capsys, *words.split()))
+    with pytest.raises(SystemExit) as ended:
+        command_line(*words.split())
+    assert ended.value.code == 2
+    assert re.search(reason, capsys.readouterr().err.splitlines()[-1])
