@@ -18,12 +18,25 @@ BOX = "<geometry><box><size>2 2 2</size></box></geometry>"
 BALL = "<geometry><sphere><radius>0.5</radius></sphere></geometry>"
 
 
+BROKEN_MESHES = {
+    "<uri>gone.stl</uri>": "gone.stl is not there",
+    "<uri>model://gone/gone.dae</uri>": "model://gone/gone.dae is not there",
+    "<uri>some.sdf</uri>": "must be one of .dae",
+    "<uri>broken.stl</uri>": "broken.stl: no triangle in it",
+    "<uri>t.obj</uri><scale>1 1</scale>": "<scale> is '1 1', must be 3 numbers",
+    "<uri>t.obj</uri><submesh><name>keel</name></submesh>": "no mesh 'keel'",
+    "": "no <uri>",
+}
 BROKEN_SHAPES = [
-    *(f"<geometry><{kind}/></geometry>" for kind in ("mesh", "heightmap", "polyline", "unheard_of")),
+    *(f"<geometry><{kind}/></geometry>" for kind in ("heightmap", "polyline", "unheard_of")),
     *(f"<geometry><box><size>{size}</size></box></geometry>" for size in ("1 2", "1 2 x", "1 2 nan", "1 2 0")),
     "<geometry><cylinder><radius>1</radius></cylinder></geometry>",
     f"<pose>1 2 3</pose>{BOX}",
 ]
+
+
+def _bad(shape):
+    return _model(f'<collision name="bad">{shape}</collision>')
 
 
 def _model(content, pose=""):
@@ -52,18 +65,21 @@ def test_a_link_is_seen_by_its_collisions_and_else_by_its_visuals(load, content,
 
 
 @pytest.mark.parametrize(
-    ("broken", "element"),
+    ("broken", "element", "reason"),
     [
-        ("<include><uri>model://ship</uri></include>", "model://ship: <include> model://ship is not there"),
-        (_model(f'<collision name="c">{BOX}</collision>', "<pose>here</pose>"), "m: <pose> is 'here'"),
-        *((_model(f'<collision name="bad">{shape}</collision>'), "m/l/bad: ") for shape in BROKEN_SHAPES),
+        ("<include><uri>model://ship</uri></include>", "model://ship", "<include> model://ship is not there"),
+        (_model(f'<collision name="c">{BOX}</collision>', "<pose>here</pose>"), "m", "<pose> is 'here'"),
+        *((_bad(shape), "m/l/bad", "") for shape in BROKEN_SHAPES),
+        *((_bad(f"<geometry><mesh>{mesh}</mesh></geometry>"), "m/l/bad", why) for mesh, why in BROKEN_MESHES.items()),
     ],
 )
-def test_what_is_broken_is_one_warning_and_the_rest_loads(load, broken, element):
+def test_what_is_broken_is_one_line_with_file_and_element_and_the_rest_loads(load, broken, element, reason):
     loaded = load(broken + _model(f'<collision name="c">{BOX}</collision>'))
     assert [shape.name for shape in loaded.shapes] == ["m/l/c"]
     (warning,) = loaded.warnings
-    assert f"some.sdf: {element}" in warning
+    assert f"some.sdf: {element}: " in warning
+    assert reason in warning
+    assert "\n" not in warning
 
 
 def test_an_unknown_version_is_a_warning(load):
