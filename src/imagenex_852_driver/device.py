@@ -104,14 +104,13 @@ class ReplyWait:
 
     def mismatch(self) -> str:
         """Return in words how the reply contradicts the command; empty if it does not."""
-        asked = (self.command.head_id, self.command.reply_kind, self.command.max_range)
-        came = (self.reply.head_id, self.reply.kind, self.reply.max_range)
-        names = ("head identification", "reply", "range")
-        wrong = [
-            f"{name} {getattr(is_, 'name', is_)} instead of {getattr(should, 'name', should)}"
-            for name, should, is_ in zip(names, asked, came)
-            if should != is_
-        ]
+        command, reply = self.command, self.reply
+        compared = (
+            ("head identification", command.head_id, reply.head_id),
+            ("reply", command.reply_kind.name, reply.kind.name),
+            ("range", command.max_range, reply.max_range),
+        )
+        wrong = [f"{name} {came} instead of {asked}" for name, asked, came in compared if came != asked]
         return f"bad reply: {', '.join(wrong)}" if wrong else ""
 
 

@@ -217,6 +217,7 @@ class LogReader:
         end = position + _RECORD_LENGTHS[kind]
         fill = self._data[reply_end:end]
         zeros = len(fill) - len(fill.lstrip(b"\0"))
+        # The zero fill ends early where the file was cut off.
         if reply_end + zeros < end:
             return ping, reply_end + zeros, "the zero fill of a ping is cut short"
         return ping, end, ""

@@ -5,7 +5,7 @@ from enum import Enum
 from typing import Union
 
 from imagenex_852_driver.command import LENGTH as COMMAND_LENGTH
-from imagenex_852_driver.command import SwitchCommand
+from imagenex_852_driver.command import TERMINATOR, SwitchCommand
 from imagenex_852_driver.reply import HEAD_IDS, SONAR_HEAD_ID, FrameError
 from node_support.parameters import ParameterError, ParameterSet, parameter
 from sonar_driver.emulated_head import EmulatedHeadParameters
@@ -83,12 +83,13 @@ class HeadSettings(ParameterSet):
             raise ParameterError(self._terminator_complaint() or str(error)) from error
 
     def _terminator_complaint(self) -> str:
-        suspects = {"pulse_length_us": 253, "switch_delay_ms": 506}
-        names = [name for name, value in suspects.items() if getattr(self, name) == value]
-        if round(self.absorption_db_per_m * 100) == 253:
-            names.append("absorption_db_per_m")
-        complaints = (f"{name} = {getattr(self, name)}" for name in names)
-        return f"{', '.join(complaints)}: its byte would be 253, which ends a command" if names else ""
+        sent = {
+            "pulse_length_us": self.pulse_length_us,
+            "switch_delay_ms": self.switch_delay_ms / 2,
+            "absorption_db_per_m": round(self.absorption_db_per_m * 100),
+        }
+        complaints = [f"{name} = {getattr(self, name)}" for name, byte in sent.items() if byte == TERMINATOR]
+        return f"{', '.join(complaints)}: its byte would be 253, which ends a command" if complaints else ""
 
 
 @dataclass(frozen=True)

@@ -96,8 +96,9 @@ class ParsedMessage(NamedTuple):
 class MessageStream:
     """Incremental parser. No whole message is lost because of what is around it; never raises.
 
-    `broken` counts messages that are not whole: by the headers that began them, and by the length of what lies between
-    whole messages, of which each beam explains as much as the last whole beam was long.
+    `broken` counts messages that are not whole, until its reader sets it back to 0. It goes by the headers that began
+    them, and by the length of what lies between whole messages, of which each beam explains as much as the last whole
+    beam was long.
     """
 
     def __init__(self) -> None:

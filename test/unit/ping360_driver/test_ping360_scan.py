@@ -24,23 +24,22 @@ def port(request):
     return request.param
 
 
-def angles(scan):
-    return [ping.beam.angle for ping in scan.pings]
-
-
 @MODES
-def test_beams_of_a_full_turn_come_one_after_the_other(port, settings):
-    scan = VirtualScan(PING360, port, settings)
-    scan.beams(405)
-    assert angles(scan) == [*range(400), *range(5)]
-    assert scan.numbers == list(range(405))
-
-
-@MODES
-def test_a_sector_is_scanned_to_and_fro(port, settings):
-    scan = VirtualScan(PING360, port, settings.changed({"sector_width_deg": 18.0}))
-    scan.beams(30)
-    assert angles(scan) == [*range(190, 211), *range(209, 200, -1)]
+@pytest.mark.parametrize(
+    ("sector", "angles", "by_itself"),
+    [
+        ({}, [*range(400), *range(5)], True),
+        ({"sector_width_deg": 18.0}, [*range(190, 211), *range(209, 200, -1)], True),
+        # Across astern it is asked ping by ping.
+        ({"sector_width_deg": 18.0, "train_angle_deg": 180.0}, [*range(390, 400), *range(5)], False),
+    ],
+)
+def test_a_full_turn_is_scanned_round_and_round_and_a_sector_to_and_fro(port, settings, sector, angles, by_itself):
+    scan = VirtualScan(PING360, port, settings.changed(sector))
+    scan.beams(len(angles))
+    assert [ping.beam.angle for ping in scan.pings] == angles
+    assert scan.numbers == list(range(len(angles)))
+    assert scan.stats.mode == (settings.scan_mode.value if by_itself else "request")
 
 
 class CannotScan(EmulatedPing360):
@@ -89,13 +88,6 @@ def test_a_pulse_too_long_for_the_head_comes_back_as_the_head_made_it(port):
     scan.beams(20)
     assert scan.pings[-1].beam.pulse.transmit_duration == 128
     assert scan.stats.details()["transmit duration [us]"] == "128"
-
-
-def test_a_sector_across_astern_is_asked_for_ping_by_ping(port):
-    scan = VirtualScan(PING360, port, PING360.settings.changed({"sector_width_deg": 18.0, "train_angle_deg": 180.0}))
-    scan.beams(15)
-    assert angles(scan) == [*range(390, 400), *range(5)]
-    assert scan.stats.mode == "request"
 
 
 @MODES

@@ -13,9 +13,8 @@ from sonar_simulator.echoes.echo_model import make_echo_model
 NOISE_FREE = {"spread": 0.0, "noise_echoes": 0}
 
 
-def _echoes(distances, seed=0, **values):
-    beams = make_echo_model("laser_cone", values).echoes(Contacts.of_ranges(distances), np.random.default_rng(seed))
-    return beams[0] if np.ndim(distances) == 1 else beams
+def _echoes(distances, model="laser_cone", **values):
+    return make_echo_model(model, values).echoes(Contacts.of_ranges(distances), np.random.default_rng(0))[0]
 
 
 @given(st.floats(0.001, 50.0))
@@ -31,8 +30,7 @@ def test_each_contact_adds_15_up_to_127():
 
 @pytest.mark.parametrize("model", ["laser_cone", "collision"])
 def test_a_beam_without_a_contact_within_the_range_is_silent_and_has_no_noise(model):
-    contacts = Contacts.of_ranges([[np.inf, 50.01, 1e4]])
-    assert not make_echo_model(model, {}).echoes(contacts, np.random.default_rng(0)).any()
+    assert not _echoes([np.inf, 50.01, 1e4], model).any()
 
 
 def test_echoes_spread_about_the_contact_by_the_standard_deviation_asked_for():
@@ -68,21 +66,17 @@ def test_noise_never_leaves_0_to_127(mean, sd):
 EXACT = {"increments": 0}
 
 
-def _collisions(ranges, seed=0, **values):
-    return make_echo_model("collision", values).echoes(Contacts.of_ranges(ranges), np.random.default_rng(seed))[0]
-
-
 def test_the_fullest_bin_is_the_strongest_and_the_others_are_in_proportion():
-    strengths = _collisions([10.05] * 4 + [20.05] * 2, **EXACT)
+    strengths = _echoes([10.05] * 4 + [20.05] * 2, "collision", **EXACT)
     assert {index: strengths[index] for index in np.flatnonzero(strengths)} == {100: 127, 200: 64}
 
 
 def test_a_single_contact_is_heard_beside_any_number_of_others():
-    assert _collisions([10.05] + [20.05] * 5000, **EXACT)[100] == 1
+    assert _echoes([10.05] + [20.05] * 5000, "collision", **EXACT)[100] == 1
 
 
 def test_contacts_are_added_around_each_contact_with_the_spread_asked_for():
-    strengths = _collisions(np.full(2000, 25.05), increments=50, spread=0.6)
+    strengths = _echoes(np.full(2000, 25.05), "collision", increments=50, spread=0.6)
     ranges = (np.arange(500) + 0.5) * 0.1
     mean = np.average(ranges, weights=strengths)
     assert mean == pytest.approx(25.05, abs=0.05)
@@ -90,7 +84,7 @@ def test_contacts_are_added_around_each_contact_with_the_spread_asked_for():
 
 
 def test_noise_can_be_added_as_in_the_laser_cone():
-    assert np.count_nonzero(_collisions([25.05], increments=0, noise_echoes=15)) > 5
+    assert np.count_nonzero(_echoes([25.05], "collision", increments=0, noise_echoes=15)) > 5
 
 
 def test_its_rays_fill_a_round_cone_of_the_opening():
