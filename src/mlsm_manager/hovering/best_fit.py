@@ -187,14 +187,22 @@ def solved_best(live: LiveSolver) -> BatchResult:
 
     Places that differ between fits that are about as likely are uncertain by as much.
     """
-    starts = [live.state, *(_found(live, seed) for seed in range(1, _FILTERS + 1))]
+    starts = [live.state]
+    for seed in range(1, _FILTERS + 1):
+        found = ParticleFilter(seed=seed, remembered_turns=_ALL_TURNS).followed(live.log, live.parameters)
+        starts.append(_on_path(live, found.particles.most_likely()))
     fits = [fit_of(live.solution.with_state(start)) for start in starts]
     search = _shift_search(live)
-    likelihoods = [search.judged(_path(live, fit.state)).log_likelihood for fit in fits]
-    for better in _shifted(live, search, fits, max(likelihoods) + _CLEARLY):
-        fits.append(better)
-        likelihoods.append(search.judged(_path(live, better.state)).log_likelihood)
-    return _best(live, fits, np.array(likelihoods))
+    judged = [search.judged(_path(live, fit.state)) for fit in fits]
+    shifted = _shifted(live, search, fits, max(one.log_likelihood for one in judged) + _CLEARLY)
+    fits += shifted
+    judged += [search.judged(_path(live, fit.state)) for fit in shifted]
+    paths, likelihoods = np.array([one.path for one in judged]), np.array([one.log_likelihood for one in judged])
+    best = int(np.argmax(likelihoods))
+    shares = np.exp((likelihoods - likelihoods.max()) / _LIKELY)
+    apart = ((paths - paths[best]) ** 2).sum(axis=2) / 2.0
+    spread = (shares[:, np.newaxis] * apart).sum(axis=0) / shares.sum()
+    return replace(fits[best], pose_covariances=fits[best].pose_covariances + misfit_covariance(spread))
 
 
 def strafes(
@@ -211,12 +219,6 @@ def strafes(
     log = strafing.log
     others = [likelihood(run, fault.logged(log)) for fault, run in with_other_ranges]
     return likelihood(strafing.solution, log) > _STRAFES * max([likelihood(ahead.solution, log), *others])
-
-
-def _found(live: LiveSolver, seed: int) -> State:
-    """Return the unknowns on the likeliest path that a particle filter of the whole run finds."""
-    found = ParticleFilter(seed=seed, remembered_turns=_ALL_TURNS).followed(live.log, live.parameters)
-    return _on_path(live, found.particles.most_likely())
 
 
 def _shift_search(live: LiveSolver) -> ShiftSearch:
@@ -250,11 +252,3 @@ def _on_path(live: LiveSolver, path: np.ndarray) -> State:
 def _path(live: LiveSolver, state: State) -> np.ndarray:
     """Return where the nodes are (n, 2) [m] in map."""
     return live.solution.with_state(state).places
-
-
-def _best(live: LiveSolver, fits: List[BatchResult], likelihoods: np.ndarray) -> BatchResult:
-    paths, best = np.array([_path(live, fit.state) for fit in fits]), int(np.argmax(likelihoods))
-    shares = np.exp((likelihoods - likelihoods.max()) / _LIKELY)
-    apart = ((paths - paths[best]) ** 2).sum(axis=2) / 2.0
-    spread = (shares[:, np.newaxis] * apart).sum(axis=0) / shares.sum()
-    return replace(fits[best], pose_covariances=fits[best].pose_covariances + misfit_covariance(spread))

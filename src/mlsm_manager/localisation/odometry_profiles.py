@@ -142,10 +142,6 @@ def _thrusters(own: OdometryChoice) -> OdometryModel:
     return ThrusterFactors(replace(_positions(own), scale_walk=scale_walk, **current))
 
 
-def _heading(own: OdometryChoice) -> OdometryModel:
-    return HeadingFactors(_speeds(own), _compass(own))
-
-
 def _none(own: OdometryChoice) -> OdometryModel:
     deviation = max(own.turn_rate_deviation, 1e-5)
     return UnaidedFactors(_speeds(own), deviation, own.turn_rate_correlation_time, _TURN_NOISE)
@@ -155,8 +151,8 @@ _MODELS: Dict[OdometryKind, Callable[[OdometryChoice], OdometryModel]] = {
     OdometryKind.AUTO: lambda own: UnsureFactors(_positions(own)),
     OdometryKind.DVL: lambda own: DvlFactors(_positions(own)),
     OdometryKind.THRUSTERS: _thrusters,
-    OdometryKind.HEADING: _heading,
-    OdometryKind.HOVERING: _heading,
+    OdometryKind.HEADING: lambda own: HeadingFactors(_speeds(own), _compass(own)),
+    OdometryKind.HOVERING: lambda own: HeadingFactors(_speeds(own), _compass(own)),
     OdometryKind.NONE: _none,
 }
 
