@@ -15,9 +15,9 @@ from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.normal_equations import NormalEquations, Residuals, dense_solution, sparse_solution
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
 from mlsm_manager.joint_solver.run_log import parts_of, stacked, unstacked
-from mlsm_manager.joint_solver.surface_points import SurfacePoints, points_per_echo, reaches, surface_normals
+from mlsm_manager.joint_solver.surface_points import points_per_echo, reaches, surface_normals
 from mlsm_manager.joint_solver.window import fading, joint_covariance, nearest_groups
-from mlsm_manager.scan_matching.scan import Scan, Track
+from mlsm_manager.scan_matching.scan import Track
 
 
 @pytest.fixture(scope="module")
@@ -25,8 +25,12 @@ def log():
     return logged(tour(3, direction=0.1, delay=0.3).scans)
 
 
+def placed_in(log, state):
+    return solution_of(log, DVL, state).placed(log.surfaces.heard(0, 3))
+
+
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
-    placed = solution_of(log, DVL, some_state(log)).placed(log.surfaces.heard(0, 3))
+    placed = placed_in(log, some_state(log))
     pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, solver_parameters())
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
@@ -34,12 +38,10 @@ def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
 
 @pytest.mark.parametrize("unknown", range(2))
 def test_places_follow_the_run_s_unknowns_as_their_derivatives_say(log, unknown):
-    rows, state = log.surfaces.rows(0, 3), some_state(log)
-    placed = solution_of(log, DVL, state).placed(log.surfaces.points(rows))
-    moved = state.copy()
-    step = 0.01  # delays within one step of the odometry: its path is a polygon
-    moved.run[unknown] += step
-    change = (solution_of(log, DVL, moved).placed(log.surfaces.points(rows)).places - placed.places) / step
+    state, step = some_state(log), 0.01  # delays within one step of the odometry: its path is a polygon
+    placed = placed_in(log, state)
+    state.run[unknown] += step
+    change = (placed_in(log, state).places - placed.places) / step
     np.testing.assert_allclose(change, placed.by_run[..., unknown], atol=0.5)
     np.testing.assert_allclose(np.median(np.abs(change - placed.by_run[..., unknown])), 0.0, atol=0.03)
 
@@ -65,8 +67,7 @@ def test_a_vehicle_that_stays_keeps_blocks_to_compare_with():
 
 def test_a_block_fades_out_before_it_is_left_out():
     distances = np.arange(1.0, 12.0)
-    nudged = distances + 1e-9
-    np.testing.assert_allclose(fading(distances, 5), fading(nudged, 5), atol=1e-8)
+    np.testing.assert_allclose(fading(distances, 5), fading(distances + 1e-9, 5), atol=1e-8)
 
 
 @given(st.lists(st.floats(0.01, 9.0), min_size=1, max_size=8))
@@ -92,22 +93,20 @@ def test_an_error_of_what_is_held_passes_on_to_what_hangs_on_it():
     assert solution.covariances(np.array([[0]]), np.array([[9.0]]))[0][0, 0, 0] == pytest.approx(0.25 + 9.0)
 
 
-def wall(count=30):
-    return np.column_stack([np.full(count, 10.0), np.linspace(-6.0, 6.0, count)])
+WALL = np.column_stack([np.full(30, 10.0), np.linspace(-6.0, 6.0, 30)])
 
 
 def test_the_normal_of_a_wall_is_square_to_it():
-    normals, qualities = surface_normals(wall(), np.full(30, 2.3))
+    normals, qualities = surface_normals(WALL, np.full(30, 2.3))
     np.testing.assert_allclose(np.abs(normals[:, 0]), 1.0, atol=1e-9)
     assert qualities.min() > 0.9
 
 
 def test_a_coarse_head_s_points_on_a_far_wall_are_still_a_surface():
-    step = np.radians(3.0)
-    bearings = np.arange(-8, 9) * step
-    wall_points = 40.0 * np.column_stack([np.ones(17), np.tan(bearings)])
-    reach = reaches(np.arange(17.0), bearings, np.hypot(*wall_points.T))
-    assert surface_normals(wall_points, reach)[1][4:13].min() == 1.0
+    bearings = np.radians(3.0) * np.arange(-8, 9)
+    far = 40.0 * np.column_stack([np.ones(17), np.tan(bearings)])
+    reach = reaches(np.arange(17.0), bearings, np.hypot(*far.T))
+    assert surface_normals(far, reach)[1][4:13].min() == 1.0
 
 
 def test_a_beam_that_heard_nothing_does_not_change_the_reach():
@@ -122,32 +121,27 @@ def test_points_all_along_one_echo_share_its_weight():
     np.testing.assert_array_equal(points_per_echo(times, ranges), [3.0, 1.0, 3.0, 3.0, 1.0, 1.0])
 
 
+FIRST, SECOND = heard(2)
+
+
 def drawn_along(scan, points):
     """Return a scan in which each echo is so many points, a metre apart along the beam."""
     sights = scan.points * [1.0, 1.0, 0.0, 0.0]
     metre = sights / np.hypot(*sights[:, :2].T)[:, np.newaxis]
     places = np.concatenate([scan.points + step * metre for step in range(points)])
-    times, moving = np.tile(scan.times, points), np.tile(scan.moving, points)
-    return Scan(places, times, moving, scan.track, scan.reference_time)
+    return replace(scan, points=places, times=np.tile(scan.times, points), moving=np.tile(scan.moving, points))
 
 
-def test_echoes_that_are_drawn_as_several_points_are_plateaus():
-    scans = heard(3)
-    assert not logged(scans).has_plateaus
-    assert logged([drawn_along(scan, 3) for scan in scans]).has_plateaus
-    assert not logged([]).has_plateaus
-
-
-def test_plateaus_make_the_scale_of_ranges_less_certain_unless_it_is_calibrated():
-    peaks, plateaus = logged(heard(3)), logged([drawn_along(scan, 3) for scan in heard(3)])
+def test_echoes_that_are_drawn_as_several_points_are_plateaus_whose_scale_is_less_certain_unless_it_is_calibrated():
+    peaks, plateaus = logged([FIRST, SECOND]), logged([drawn_along(scan, 3) for scan in (FIRST, SECOND)])
+    assert [log.has_plateaus for log in (logged([]), peaks, plateaus)] == [False, False, True]
     unknown, calibrated = solver_parameters(), solver_parameters(plateau_scale_deviation=0.0)
     assert [unknown.run_deviations(log)[0] for log in (peaks, plateaus)] == [0.02, 0.03]
     assert [calibrated.run_deviations(log)[0] for log in (peaks, plateaus)] == [0.02, 0.02]
 
 
 def test_a_scan_that_is_taken_back_and_a_run_that_begins_later_do_not_count():
-    first, second = heard(2)
-    log = logged([first, drawn_along(second, 6)])
+    log = logged([FIRST, drawn_along(SECOND, 6)])
     assert (log.has_plateaus, log.since(1).has_plateaus) == (True, True)
     log.shorten(1)
     assert not log.has_plateaus
@@ -170,7 +164,7 @@ def test_a_heap_of_points_is_no_surface():
 
 
 def test_qualities_do_not_jump_when_points_move_a_little():
-    points = wall() + np.random.RandomState(4).normal(0.0, 0.5, (30, 2))
+    points = WALL + np.random.RandomState(4).normal(0.0, 0.5, (30, 2))
     nudged = points + np.random.RandomState(6).choice([-1e-9, 1e-9], points.shape)
     before, after = (surface_normals(some, np.full(30, 2.3))[1] for some in (points, nudged))
     np.testing.assert_allclose(before, after, atol=1e-6)
@@ -179,7 +173,6 @@ def test_qualities_do_not_jump_when_points_move_a_little():
 def test_normals_point_away_from_the_sonar(log):
     points, _ = log.surfaces.heard(0, 3)
     sight = np.column_stack([np.cos(points.bearings), np.sin(points.bearings)])
-    assert isinstance(points, SurfacePoints)
     assert (np.einsum("na,na->n", sight, points.normals) > 0.0).all()
 
 
@@ -205,9 +198,6 @@ def test_a_run_without_estimates_stores_none():
     assert unstacked(LiveEstimate, stacked([], "a."), "a.") == []
 
 
-FIRST, SECOND = heard(2)
-
-
 def test_every_point_is_in_the_part_of_its_time():
     parts = parts_of(SECOND, 3, FIRST.reference_time)
     assert sum(len(part) for part in parts) == len(SECOND)
@@ -215,10 +205,13 @@ def test_every_point_is_in_the_part_of_its_time():
     assert all(later.times.min() > earlier.reference_time for earlier, later in zip(parts, parts[1:]))
 
 
-def test_parts_last_equally_long_and_end_with_the_turn():
-    ends = [part.reference_time for part in parts_of(SECOND, 4, FIRST.reference_time)]
+@pytest.mark.parametrize("turn", [SECOND, SECOND.without_points(SECOND.reference_time)], ids=["heard", "deaf"])
+@pytest.mark.parametrize("newest", [None, FIRST.reference_time])
+def test_parts_last_equally_long_and_end_with_the_turn(turn, newest):
+    ends = [part.reference_time for part in parts_of(turn, 4, newest)]
     np.testing.assert_allclose(np.diff(ends), np.diff(ends)[0])
-    assert ends[-1] == SECOND.reference_time
+    assert np.diff(ends)[0] > 0.0
+    assert (len(ends), ends[-1]) == (4, SECOND.reference_time)
 
 
 def test_a_turn_after_a_silence_is_cut_where_it_was_heard():
@@ -228,11 +221,3 @@ def test_a_turn_after_a_silence_is_cut_where_it_was_heard():
 
 def test_one_part_is_the_scan_itself():
     assert parts_of(SECOND, 1, None)[0] is SECOND
-
-
-def test_a_turn_without_echoes_has_as_many_parts():
-    empty = SECOND.without_points(SECOND.reference_time)
-    for newest in (None, FIRST.reference_time):
-        parts = parts_of(empty, 3, newest)
-        assert len(parts) == 3
-        assert np.all(np.diff([part.reference_time for part in parts]) > 0.0)
