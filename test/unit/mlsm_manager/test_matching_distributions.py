@@ -18,6 +18,8 @@ from mlsm_manager.scan_matching.scan import MatchStatus, corrected_points
 from mlsm_manager.scan_matching.scan_path import SCALE
 
 FREE_RATES = np.array([1.0, 1.0, 0.1, 0.3, 0.3, 0.03, 1e-3, 1e-3])
+MAP, SCAN = map_of(harbour()), scan_of(harbour(), still())
+LONG_WALL, BESIDE_WALL = map_of(wall((-25, 10), (25, 10))), scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
 
 
 def match(scan, target, expected, deviations=DEVIATIONS, **changes):
@@ -29,8 +31,7 @@ def match(scan, target, expected, deviations=DEVIATIONS, **changes):
 @given(st.floats(-2.0, 2.0), st.floats(-2.0, 2.0), st.floats(-0.3, 0.3))
 def test_a_pose_is_found_from_a_wrong_expectation(x, y, yaw):
     truth = np.array([1.0, -0.5, 0.3])
-    scan = scan_of(harbour(), still(truth), still((0.3, 0.2, 0.0)))
-    result = match(scan, map_of(harbour()), truth + np.array([x, y, yaw]))
+    result = match(scan_of(harbour(), still(truth), still((0.3, 0.2, 0.0))), MAP, truth + np.array([x, y, yaw]))
     assert result.status is MatchStatus.CONVERGED, result.reason
     np.testing.assert_allclose(result.pose, truth, atol=0.03)
 
@@ -40,8 +41,7 @@ def test_a_pose_is_found_from_a_wrong_expectation(x, y, yaw):
 def test_a_velocity_that_the_odometry_missed_is_found(along, aside, turn_rate):
     velocity = np.array([along, aside, turn_rate])
     truth = at_velocity(velocity)
-    scan = scan_of(harbour(), truth, still(), moving=True)
-    result = match(scan, map_of(harbour()), truth(16.0), FREE_RATES)
+    result = match(scan_of(harbour(), truth, still(), moving=True), MAP, truth(16.0), FREE_RATES)
     assert result.status is MatchStatus.CONVERGED, result.reason
     np.testing.assert_allclose(result.velocity, velocity, atol=0.015)
     np.testing.assert_allclose(result.pose, truth(16.0), atol=0.06)
@@ -50,24 +50,23 @@ def test_a_velocity_that_the_odometry_missed_is_found(along, aside, turn_rate):
 def test_a_matched_scan_is_put_where_its_points_were():
     truth = at_velocity((0.3, 0.0, 0.03))
     scan = scan_of(harbour(), truth, at_velocity((0.2, 0.0, 0.02)), moving=True)
-    result = match(scan, map_of(harbour()), truth(16.0), FREE_RATES)
-    true_places = scan_of(harbour(), truth).points
-    assert np.linalg.norm(corrected_points(scan, result)[:, :2] - true_places[:, :2], axis=1).max() < 0.15
-    np.testing.assert_array_equal(corrected_points(scan, result)[:, 2:], scan.points[:, 2:])
+    result = match(scan, MAP, truth(16.0), FREE_RATES)
+    points, true_places = corrected_points(scan, result), scan_of(harbour(), truth).points
+    assert np.linalg.norm(points[:, :2] - true_places[:, :2], axis=1).max() < 0.15
+    np.testing.assert_array_equal(points[:, 2:], scan.points[:, 2:])
 
 
 def test_the_path_ends_at_the_pose():
-    scan = scan_of(harbour(), at_velocity((0.3, 0.0, 0.03)))
-    result = match(scan, map_of(harbour()), at_velocity((0.3, 0.0, 0.03))(16.0))
+    path = at_velocity((0.3, 0.0, 0.03))
+    scan = scan_of(harbour(), path)
+    result = match(scan, MAP, path(16.0))
     np.testing.assert_allclose(result.beam_poses[-1], result.pose)
     assert result.beam_times[-1] == scan.reference_time
 
 
 def test_what_lies_beyond_the_reach_of_a_scan_changes_nothing():
-    scan = scan_of(harbour(), still())
-    alone = match(scan, map_of(harbour()), [0.5, 0.5, 0.1])
-    far = harbour() + np.array([500.0, 0.0])
-    beside = match(scan, map_of(np.vstack([harbour(), far])), [0.5, 0.5, 0.1])
+    larger = map_of(np.vstack([harbour(), harbour() + np.array([500.0, 0.0])]))
+    alone, beside = (match(SCAN, target, [0.5, 0.5, 0.1]) for target in (MAP, larger))
     np.testing.assert_allclose(beside.pose, alone.pose, atol=1e-9)
     np.testing.assert_allclose(beside.covariance, alone.covariance, rtol=1e-6)
 
@@ -76,29 +75,25 @@ def test_a_scale_error_of_the_odometry_is_found_while_it_moves():
     truth = at_velocity((0.3, 0.0, 0.0))
     scan = scan_of(harbour(), truth, at_velocity((0.2, 0.0, 0.0)), moving=True)
     deviations = np.array([1.0, 1.0, 0.1, 1e-3, 1e-3, 1e-4, 0.5, 0.1])
-    result = match(scan, map_of(harbour()), truth(16.0), deviations)
+    result = match(scan, MAP, truth(16.0), deviations)
     assert result.belief.theta[SCALE] == pytest.approx(0.5, abs=0.05)
 
 
 def test_the_prior_keeps_what_it_is_sure_of():
     """The weights are those of the deviations: a certain odometry is not moved by a scan."""
-    scan = scan_of(harbour(), still())
     sure = np.full(8, 1e-4)
-    result = match(scan, map_of(harbour()), [0.3, 0.0, 0.0], sure, min_agreement=0.0, min_significance=0.0)
+    result = match(SCAN, MAP, [0.3, 0.0, 0.0], sure, min_agreement=0.0, min_significance=0.0)
     np.testing.assert_allclose(result.pose, [0.3, 0.0, 0.0], atol=0.01)
 
 
 def test_a_match_makes_the_prior_surer_and_never_less_sure():
-    scan = scan_of(harbour(), still())
-    result = match(scan, map_of(harbour()), np.zeros(3))
-    deviations = np.sqrt(np.diag(result.belief.covariance))
+    deviations = np.sqrt(np.diag(match(SCAN, MAP, np.zeros(3)).belief.covariance))
     assert (deviations <= DEVIATIONS * (1.0 + 1e-6)).all()
     assert (deviations[:3] < 0.1 * DEVIATIONS[:3]).all()
 
 
 def test_along_a_single_wall_a_scan_is_ambiguous_and_the_deviation_that_of_the_prior_but_not_across_it():
-    scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
-    result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.5, 0.3, 0.02])
+    result = match(BESIDE_WALL, LONG_WALL, [0.5, 0.3, 0.02])
     assert result.status is MatchStatus.AMBIGUOUS
     assert "least certain direction" in result.reason
     along, across = np.sqrt(np.diag(result.covariance)[:2])
@@ -109,9 +104,8 @@ def test_along_a_single_wall_a_scan_is_ambiguous_and_the_deviation_that_of_the_p
 
 def test_beside_a_wall_a_sure_odometry_gives_a_fix():
     """What the wall leaves open the odometry tells."""
-    scan = scan_of(wall((-20, 10), (20, 10), offset=0.2), still())
     sure = np.array([0.1, 1.0, 0.1, 1e-3, 1e-3, 1e-4, 1e-3, 1e-3])
-    result = match(scan, map_of(wall((-25, 10), (25, 10))), [0.05, 0.5, 0.02], sure)
+    result = match(BESIDE_WALL, LONG_WALL, [0.05, 0.5, 0.02], sure)
     assert result.status is MatchStatus.CONVERGED, result.reason
     np.testing.assert_allclose(result.pose, [0.0, 0.0, 0.0], atol=0.1)
     assert result.covariance[0, 0] == pytest.approx(0.1**2, rel=0.2)
@@ -140,32 +134,31 @@ NOISE = [np.random.default_rng(seed).uniform(-20.0, 20.0, (150, 2)) for seed in 
 
 @pytest.mark.parametrize("places", [OTHER_PLACE, harbour() - 200.0, *NOISE])
 def test_scans_of_noise_of_another_place_or_of_one_far_away_are_not_accepted(places):
-    assert not match(scan_of(places, still()), map_of(harbour()), np.zeros(3)).accepted
+    assert not match(scan_of(places, still()), MAP, np.zeros(3)).accepted
 
 
 def test_a_jump_beyond_the_priors_deviations_is_rejected():
     deviations = np.array([0.3, 0.3, 0.1, 1e-3, 1e-3, 1e-4, 1e-3, 1e-3])
-    scan = scan_of(harbour(), still())
-    result = match(scan, map_of(harbour()), [0.85, 0.0, 0.0], deviations, max_jump=1.5)
+    result = match(SCAN, MAP, [0.85, 0.0, 0.0], deviations, max_jump=1.5)
     assert result.status is MatchStatus.REJECTED_JUMP
     assert "standard deviations from where it was expected" in result.reason
 
 
 def test_a_refinement_that_finds_no_end_says_so():
-    result = match(scan_of(harbour(), still()), map_of(harbour()), [0.5, 0.5, 0.1], max_steps=1)
+    result = match(SCAN, MAP, [0.5, 0.5, 0.1], max_steps=1)
     assert result.status is MatchStatus.DIVERGED
     assert "after 1 iterations" in result.reason
 
 
 def test_an_unmatched_scan_keeps_the_priors_pose():
-    result = match(scan_of(harbour()[:3], still()), map_of(harbour()), [1.0, 2.0, 0.3])
+    result = match(scan_of(harbour()[:3], still()), MAP, [1.0, 2.0, 0.3])
     np.testing.assert_allclose(result.pose, [1.0, 2.0, 0.3])
     np.testing.assert_allclose(np.diag(result.belief.covariance), DEVIATIONS**2, rtol=1e-4)
 
 
 def test_the_correction_takes_the_odometrys_pose_to_the_matched_one():
     scan = scan_of(harbour(), still((1.0, -0.5, 0.3)), still((0.3, 0.2, 0.0)))
-    result = match(scan, map_of(harbour()), [1.0, -0.5, 0.3])
+    result = match(scan, MAP, [1.0, -0.5, 0.3])
     x, y, yaw = scan.correction_to(result.pose)
     turned = np.array([x + np.cos(yaw) * 0.3 - np.sin(yaw) * 0.2, y + np.sin(yaw) * 0.3 + np.cos(yaw) * 0.2, yaw])
     np.testing.assert_allclose(turned, result.pose, atol=1e-9)
@@ -199,42 +192,36 @@ def test_a_buoy_holds_a_point_on_all_sides():
     assert (np.linalg.eigvalsh(distributions.covariance)[:, 1] < 1.0).all()
 
 
-HERE = np.zeros(2)
-
-
 def agreed(points, on_map, blocks):
-    return agreement(points, np.broadcast_to(on_map, len(points)), HERE, blocks)[1]
+    return agreement(points, np.broadcast_to(on_map, len(points)), np.zeros(2), blocks)[1]
 
 
-def test_a_scan_of_the_mapped_place_agrees_wholly():
-    assert agreed(harbour(0.2), True, harbour()) == pytest.approx(1.0)
+AHEAD, NEARER = wall((-20, 10), (20, 10)), wall((-20, 6), (20, 6))
+ASTERN, BOAT = wall((-20, -10), (20, -10)), wall((-8, 6), (8, 6))
+
+
+@pytest.mark.parametrize(
+    ("points", "on_map", "blocks"),
+    [
+        (harbour(0.2), True, harbour()),
+        (np.vstack([AHEAD, ASTERN]), np.arange(2 * len(AHEAD)) < len(AHEAD), AHEAD),
+        (NEARER, True, np.vstack([NEARER, wall((-8, 12), (8, 12))])),
+        (AHEAD, True, np.vstack([AHEAD, wall((-5, -10), (5, -10))])),
+    ],
+    ids=["the mapped place", "echoes where the map has nothing yet", "behind a nearer echo", "where no echo came from"],
+)
+def test_nothing_speaks_against_a_scan_of_the_mapped_place_nor_what_cannot_be_known(points, on_map, blocks):
+    assert agreed(points, on_map, blocks) == pytest.approx(1.0)
 
 
 def test_echoes_beside_what_the_map_has_in_their_direction_count_against_it():
-    mapped, boat = wall((-20, 10), (20, 10)), wall((-8, 6), (8, 6))
-    points = np.vstack([mapped, boat])
-    assert agreed(points, np.arange(len(points)) < len(mapped), mapped) == pytest.approx(len(mapped) / len(points))
-
-
-def test_echoes_in_a_direction_in_which_the_map_has_nothing_yet_say_nothing():
-    mapped, unknown = wall((-20, 10), (20, 10)), wall((-20, -10), (20, -10))
-    points = np.vstack([mapped, unknown])
-    assert agreed(points, np.arange(len(points)) < len(mapped), mapped) == pytest.approx(1.0)
+    points = np.vstack([AHEAD, BOAT])
+    assert agreed(points, np.arange(len(points)) < len(AHEAD), AHEAD) == pytest.approx(len(AHEAD) / len(points))
 
 
 def test_a_mapped_surface_counts_against_it_when_echoes_come_from_behind():
     behind, before = wall((-20, 12), (20, 12)), wall((-4, 6), (4, 6))
     assert agreed(behind, True, np.vstack([behind, before])) < 0.85
-
-
-def test_a_mapped_surface_behind_a_nearer_echo_says_nothing():
-    near, hidden = wall((-20, 6), (20, 6)), wall((-8, 12), (8, 12))
-    assert agreed(near, True, np.vstack([near, hidden])) == pytest.approx(1.0)
-
-
-def test_a_mapped_surface_in_a_direction_without_any_echo_says_nothing():
-    heard, silent = wall((-20, 10), (20, 10)), wall((-5, -10), (5, -10))
-    assert agreed(heard, True, np.vstack([heard, silent])) == pytest.approx(1.0)
 
 
 FIXES = 40
@@ -275,8 +262,7 @@ def test_fixes_err_as_much_as_their_covariance_says_whatever_the_noise(noise):
 
 
 def test_a_scan_without_noise_is_not_infinitely_sure():
-    scan = scan_of(harbour(), still())
-    deviations = np.sqrt(np.diag(match(scan, map_of(harbour()), np.zeros(3), FIX_DEVIATIONS).covariance))
+    deviations = np.sqrt(np.diag(match(SCAN, MAP, np.zeros(3), FIX_DEVIATIONS).covariance))
     assert (deviations[:2] > 1e-3).all()
     assert deviations[2] > 1e-4
 

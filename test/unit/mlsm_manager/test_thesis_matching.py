@@ -7,7 +7,7 @@ from benchmarks.scans import KINDS
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from made_maps import map_with
-from made_scans import at_velocity, belief_in, harbour, map_of, scan_of, still, wall
+from made_scans import DEVIATIONS, at_velocity, belief_in, harbour, map_of, scan_of, still, wall
 from thesis_results.moves import displaced_fix
 from thesis_results.thesis_scans import ThesisScans, thesis_estimator
 
@@ -23,6 +23,7 @@ from mlsm_manager.thesis_matching.thesis_matcher import (
 from node_support.geometry import composed, transformed
 
 POSTS = np.array([[4.0, 0.0], [0.0, 6.0], [-5.0, -1.0], [2.0, -7.0], [8.0, 8.0]])
+MAP, SCAN = map_of(harbour()), scan_of(harbour(), still())
 OFFSETS = st.tuples(st.floats(-0.8, 0.8), st.floats(-0.8, 0.8)).map(np.array)
 
 
@@ -36,10 +37,6 @@ def segments(times, moving, errors):
     return translate_segments(times, moving, errors, np.ones(len(times), dtype=bool))
 
 
-def column(*heights):
-    return map_with([[0.2, 0.2, z, 1.0] for z in heights]).blocks
-
-
 def test_the_closest_block_is_that_of_the_nearest_cell():
     closest = ClosestBlocks(map_of(np.array([[0.2, 0.2], [5.2, 0.2]])))
     assert closest.find(np.array([[2.0, 0.0, -2.0], [3.5, 0.0, -2.0]])).tolist() == [0, 1]
@@ -48,7 +45,7 @@ def test_the_closest_block_is_that_of_the_nearest_cell():
 @pytest.mark.parametrize(("height", "block"), [(-9.0, 0), (-4.8, 0), (-1.0, 1), (3.0, 1)])
 def test_in_a_column_the_block_nearest_in_height_is_taken(height, block):
     """The 2015 code compared the height with the mean of x."""
-    blocks = column(-5.0, 0.0)
+    blocks = map_with([[0.2, 0.2, z, 1.0] for z in (-5.0, 0.0)]).blocks
     found = ClosestBlocks(blocks).find(np.array([[100.0, 0.0, height]]))[0]
     assert np.argsort(blocks.mean[:, 2])[block] == found
 
@@ -63,9 +60,8 @@ def test_the_search_along_the_movement_prefers_the_block_that_lies_in_its_direct
 def test_without_samples_or_movement_the_search_takes_the_closest_block():
     closest = ClosestBlocks(map_of(harbour()))
     points = np.column_stack([harbour() + 0.3, np.full(len(harbour()), -2.0)])
-    still_steps, steps = np.zeros_like(points), np.full_like(points, 0.2)
-    np.testing.assert_array_equal(closest.find_along(points, still_steps, 5), closest.find(points))
-    np.testing.assert_array_equal(closest.find_along(points, steps, 0), closest.find(points))
+    for steps, samples in ((np.zeros_like(points), 5), (np.full_like(points, 0.2), 0)):
+        np.testing.assert_array_equal(closest.find_along(points, steps, samples), closest.find(points))
 
 
 @given(OFFSETS)
@@ -80,18 +76,16 @@ def test_a_still_segment_moves_by_its_mean_error(error):
 def test_a_moving_segment_moves_along_a_line_over_time(offset, slope):
     times = np.linspace(0.0, 8.0, 20)
     errors = offset + times[:, np.newaxis] * slope
-    translations, slope = segments(times, np.ones(20, dtype=bool), errors)
+    translations, found = segments(times, np.ones(20, dtype=bool), errors)
     np.testing.assert_allclose(translations, errors, atol=1e-9)
-    np.testing.assert_allclose(slope, slope, atol=1e-9)
+    np.testing.assert_allclose(found, slope, atol=1e-9)
 
 
 @given(OFFSETS, OFFSETS)
 def test_a_moving_segment_begins_where_the_still_one_ended(offset, slope):
     times = np.arange(20.0)
-    moving = times >= 8.0
     errors = offset + np.maximum(times - 7.0, 0.0)[:, np.newaxis] * slope
-    translations, slope = segments(times, moving, errors)
-    np.testing.assert_allclose(translations, errors, atol=1e-9)
+    np.testing.assert_allclose(segments(times, times >= 8.0, errors)[0], errors, atol=1e-9)
 
 
 def test_every_change_between_still_and_moving_begins_a_segment():
@@ -146,7 +140,7 @@ def assert_at_origin(result):
 
 
 def test_a_still_scan_is_turned_back_too():
-    assert_at_origin(match(scan_of(harbour(), still()), map_of(harbour()), [0.3, -0.2, np.radians(5.0)]))
+    assert_at_origin(match(SCAN, MAP, [0.3, -0.2, np.radians(5.0)]))
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -156,10 +150,9 @@ def test_a_still_scan_of_the_basin_comes_back_to_its_place(seed):
 
 
 def test_the_yaw_of_a_moving_scan_stays_the_priors():
-    scan = scan_of(harbour(), still(), moving=True)
-    result = match(scan, map_of(harbour()), [0.0, 0.0, 0.02])
+    result = match(scan_of(harbour(), still(), moving=True), MAP, [0.0, 0.0, 0.02])
     assert result.pose[2] == pytest.approx(0.02)
-    assert result.covariance[2, 2] == pytest.approx(belief_in(np.zeros(3), scan).covariance[2, 2])
+    assert result.covariance[2, 2] == pytest.approx(DEVIATIONS[2] ** 2)
 
 
 def test_a_velocity_that_the_odometry_missed_is_found_among_posts():
@@ -182,15 +175,13 @@ def test_a_point_inside_a_blocks_spread_has_no_error():
 
 def test_it_goes_on_below_the_error_threshold_as_long_as_the_error_falls():
     """The 2015 code took the first pose below the threshold."""
-    scan = scan_of(harbour(), still())
-    strict, loose = (match(scan, map_of(harbour()), [0.6, 0.4, 0.0], error_threshold=most).pose for most in (0.01, 5.0))
+    strict, loose = (match(SCAN, MAP, [0.6, 0.4, 0.0], error_threshold=most).pose for most in (0.01, 5.0))
     np.testing.assert_array_equal(strict, loose)
 
 
 @pytest.mark.parametrize("limit", [1, 2, 3])
 def test_without_success_it_stops_at_max_iterations_and_is_not_accepted(limit):
-    scan = scan_of(harbour(), still())
-    result = match(scan, map_of(harbour()), [0.9, 0.9, 0.1], error_threshold=0.0, max_iterations=limit)
+    result = match(SCAN, MAP, [0.9, 0.9, 0.1], error_threshold=0.0, max_iterations=limit)
     assert result.status is MatchStatus.DIVERGED
     assert f"after {limit} iterations" in result.reason
 

@@ -12,7 +12,7 @@ SCANS = 5
 
 
 def normals_at(angles):
-    return np.column_stack([np.cos(angles), np.sin(angles)])
+    return np.stack([np.cos(angles), np.sin(angles)], axis=-1)
 
 
 def canal_normals(direction, error=0.15, seed=0):
@@ -20,6 +20,10 @@ def canal_normals(direction, error=0.15, seed=0):
     rng = np.random.RandomState(seed)
     sides = rng.choice([-0.5 * np.pi, 0.5 * np.pi], 40 * SCANS)
     return normals_at(direction + sides + rng.normal(0.0, error, 40 * SCANS))
+
+
+CLOSED = np.where(np.arange(40 * SCANS)[:, np.newaxis] % 3, canal_normals(0.0), [1.0, 0.0])
+ALL_WAYS = normals_at(np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 40 * SCANS))
 
 
 def canal(direction, error=0.15, first=0, seed=0):
@@ -33,8 +37,7 @@ def counted(points, matching=MATCHING):
 
 @pytest.mark.parametrize("direction", [0.0, 0.6, 2.0])
 def test_straight_walls_say_nothing_of_the_way_along_them(direction):
-    counting = counted(canal(direction))
-    along = counting.normals @ normals_at(np.array([direction]))[0]
+    along = counted(canal(direction)).normals @ normals_at(direction)
     assert np.abs(along).max() < 0.03
 
 
@@ -47,27 +50,20 @@ def test_straight_walls_say_all_of_the_way_across_them():
 
 def test_bulges_that_travel_along_a_wall_say_nothing_of_the_way_along_it():
     points = canal(0.0)
-    points.normals[::20] = normals_at(np.full(len(points.normals[::20]), 0.9))
+    points.normals[::20] = normals_at(0.9)
     assert np.abs(counted(points).normals[:, 0]).max() < 0.03
 
 
 def test_a_few_echoes_that_face_along_a_canal_do_not_count():
     points = canal(0.0)
     points.normals[::40] = [1.0, 0.0]
-    counting = counted(points)
-    np.testing.assert_array_equal(counting.qualities[::40], 0.0)
+    np.testing.assert_array_equal(counted(points).qualities[::40], 0.0)
 
 
-def test_a_wall_that_closes_a_canal_tells_the_way_along_it():
-    points = canal(0.0)
-    points.normals[::3] = [1.0, 0.0]
-    np.testing.assert_array_equal(counted(points).normals, points.normals)
-
-
-def test_walls_that_face_all_ways_say_as_much_as_before():
-    angles = np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)
-    points = points_of(np.repeat(np.arange(SCANS), 40), normals=normals_at(angles))
-    np.testing.assert_array_equal(counted(points).normals, points.normals)
+@pytest.mark.parametrize("normals", [CLOSED, ALL_WAYS], ids=["a wall closes the canal", "walls face all ways"])
+def test_walls_that_tell_every_way_say_as_much_as_before(normals):
+    points = points_of(np.repeat(np.arange(SCANS), 40), normals=normals)
+    np.testing.assert_array_equal(counted(points).normals, normals)
 
 
 def test_scans_around_a_scan_tell_with_it_which_direction_is_weak():
@@ -129,7 +125,7 @@ def compared(normals, seed=0):
 def along(direction):
     """Return by how much each column changes when the compared scan moves by 1 m along `direction` [rad]."""
     change = np.zeros(COLUMNS)
-    change[PLACES[:2]] = normals_at(np.array([direction]))
+    change[PLACES[:2]] = normals_at(direction)
     return change
 
 
@@ -137,8 +133,8 @@ def counting(information, direction):
     return along(direction) @ information @ along(direction)
 
 
-def discounted_once(information, gradient):
-    found = discounted(information[np.newaxis], gradient[np.newaxis], np.zeros(1, int), PLACES, NORMAL_DEVIATION)
+def discounted_once(information, gradient, normal_deviation=NORMAL_DEVIATION):
+    found = discounted(information[np.newaxis], gradient[np.newaxis], np.zeros(1, int), PLACES, normal_deviation)
     return found[0][0], found[1][0]
 
 
@@ -157,7 +153,7 @@ def test_comparisons_with_straight_walls_say_all_of_the_way_across_them():
 
 
 def test_walls_that_face_all_ways_say_nearly_as_much_as_before():
-    information, gradient = compared(normals_at(np.random.RandomState(1).uniform(0.0, 2.0 * np.pi, 200)))
+    information, gradient = compared(ALL_WAYS)
     found, _ = discounted_once(information, gradient)
     for direction in np.linspace(0.0, np.pi, 7):
         assert counting(found, direction) > 0.85 * counting(information, direction)
@@ -182,9 +178,9 @@ def test_what_is_left_is_never_less_than_nothing():
 
 def test_normals_without_error_keep_all_information():
     information, gradient = compared(canal_normals(0.3))
-    found = discounted(information[np.newaxis], gradient[np.newaxis], np.zeros(1, int), PLACES, 0.0)
-    np.testing.assert_array_equal(found[0][0], information)
-    np.testing.assert_array_equal(found[1][0], gradient)
+    found, slope = discounted_once(information, gradient, normal_deviation=0.0)
+    np.testing.assert_array_equal(found, information)
+    np.testing.assert_array_equal(slope, gradient)
 
 
 def test_no_pairs_give_no_information():
