@@ -20,14 +20,6 @@ RETURNED = slice(26, None)  # nodes of the scans after the deaf ones
 RESUMED = 20  # scans
 
 
-def not_found_live(scans):
-    """Return a live solver after `scans` that closed no loop itself, because it was stored and resumed on the way."""
-    solver = resumed(scans[:RESUMED], solver_parameters(sonar_delay_deviation=1.0))
-    for scan in scans[RESUMED:]:
-        solver.add(scan)
-    return solver
-
-
 def errors(solver, batch, track, made):
     times = solver.log.node_times[RETURNED]
     found = track.at(times) + batch.state.nodes[RETURNED, :3]
@@ -37,7 +29,9 @@ def errors(solver, batch, track, made):
 def test_a_vehicle_that_comes_back_far_astray_is_found_by_its_surroundings():
     made = tour(40)
     scans, track = astray(made, np.array([12.0, -6.0]))
-    solver = not_found_live(scans)
+    solver = resumed(scans[:RESUMED], solver_parameters(sonar_delay_deviation=1.0))  # so that it closes none itself
+    for scan in scans[RESUMED:]:
+        solver.add(scan)
     without = fit_of(solver.solution)
     found = with_loops_closed(solver, without)
     assert errors(solver, without, track, made).mean() > 5.0
@@ -51,26 +45,22 @@ def test_a_run_that_is_not_astray_has_no_loops():
     batch = fit_of(solver.solution)
     found = with_loops_closed(solver, batch)
     assert found.batch is batch
-    assert found.to_mapping() == {"gain": None, "found": []}
+    assert found.to_mapping() == LoopClosure(None, [], np.nan).to_mapping() == {"gain": None, "found": []}
 
 
-def test_noise_makes_no_loops():
-    assert loops_of(followed(noisy(tour(40).scans)).solution) == []
-
-
-def test_a_canal_makes_no_loops():
-    """Along straight walls every place fits as well as the next."""
-    rng, made = np.random.RandomState(1), tour(40)
-
-    def between_walls(scan):
-        places = made.truth.at(scan.times)
-        x = places[:, 0] + rng.uniform(-20.0, 20.0, len(scan.points))
+def between_walls(made):
+    """Return scans of a canal, where every place fits as well as the next."""
+    rng = np.random.RandomState(1)
+    for scan in made.scans:
+        x = made.truth.at(scan.times)[:, 0] + rng.uniform(-20.0, 20.0, len(scan))
         heard = np.column_stack([x, rng.choice([-12.0, 12.0], len(x)) + rng.normal(0.0, 0.1, len(x))])
-        return that_heard(scan, made.truth, heard)
+        yield that_heard(scan, made.truth, heard)
 
-    solver = followed([between_walls(scan) for scan in made.scans])
-    batch = fit_of(solver.solution)
-    assert loops_of(solver.solution.with_state(batch.state)) == []
+
+@pytest.mark.parametrize("scans", [noisy(tour(40).scans), between_walls(tour(40))], ids=["noise", "canal"])
+def test_noise_and_a_canal_make_no_loops(scans):
+    solver = followed(scans)
+    assert loops_of(solver.solution.with_state(fit_of(solver.solution).state)) == []
 
 
 def test_a_loop_that_other_scans_do_not_confirm_is_none():
@@ -83,18 +73,13 @@ def test_a_loop_that_other_scans_do_not_confirm_is_none():
     assert agreed(alike[:2]) == []
 
 
-def test_a_fit_without_loops_says_so():
-    assert LoopClosure(None, [], np.nan).to_mapping()["gain"] is None
-
-
 PITCH = 2.5  # m, hardly more than the cut within which points are compared
 WALLS = tour(24, direction=0.12, delay=0.6).scans
 
 
 def among_furrows(scan, truth, rng):
     """Return a scan whose echoes come from furrows all along x, PITCH apart, which all look alike."""
-    places = truth.at(scan.times)
-    around = places[:, :2] + rng.uniform(-10.0, 10.0, (len(scan.points), 2))
+    around = truth.at(scan.times)[:, :2] + rng.uniform(-10.0, 10.0, (len(scan), 2))
     echoes = np.column_stack([around[:, 0], np.round(around[:, 1] / PITCH) * PITCH])
     return that_heard(scan, truth, echoes)
 

@@ -52,12 +52,9 @@ def assert_closes_none(solver, scans):
         assert not solver.closed
 
 
-def test_a_run_that_is_not_astray_closes_no_loop():
-    assert_closes_none(LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE)), tour(SCANS).scans)
-
-
-def test_noise_closes_no_loop():
-    assert_closes_none(LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE)), noisy(tour(SCANS).scans))
+@pytest.mark.parametrize("scans", [tour(SCANS).scans, noisy(tour(SCANS).scans)], ids=["not astray", "noise"])
+def test_scans_of_a_run_that_is_not_astray_and_noise_close_no_loop(scans):
+    assert_closes_none(LiveSolver(solver_parameters(), RunLog(SONAR_IN_BASE)), scans)
 
 
 def test_a_resumed_run_closes_no_loop_since_the_map_stored_with_it_would_stay_behind():
@@ -73,16 +70,17 @@ def bend_of(variances, older):
     return Bend.of([Loop(len(variances), older - 1, place)], start, covariances)
 
 
-def test_the_path_before_the_older_visit_stays():
-    assert bend_of([0.0, 1.0, 0.5, 1.0, 2.0], older=2).state(1.0).nodes[:3, 0].max() < 0.01
-
-
-def test_the_path_bends_where_it_became_uncertain():
-    np.testing.assert_allclose(bend_of([0.0, 1.0, 1.0, 2.0, 2.0], 0).state(1.0).nodes[:, 0], [0, 2, 2, 4, 4], atol=0.01)
-
-
-def test_a_branch_that_led_back_moves_with_the_place_that_it_left():
-    np.testing.assert_allclose(bend_of([0.0, 1.0, 9.0, 1.0, 2.0], 0).state(1.0).nodes[:, 0], [0, 2, 2, 2, 4], atol=0.01)
+@pytest.mark.parametrize(
+    ("variances", "older", "moves"),
+    [
+        ([0.0, 1.0, 0.5, 1.0, 2.0], 2, [0, 0, 0, 4 / 3, 4]),
+        ([0.0, 1.0, 1.0, 2.0, 2.0], 0, [0, 2, 2, 4, 4]),
+        ([0.0, 1.0, 9.0, 1.0, 2.0], 0, [0, 2, 2, 2, 4]),
+    ],
+    ids=["not before the older visit", "where it became uncertain", "a branch with the place that it left"],
+)
+def test_the_path_bends_as_it_became_uncertain(variances, older, moves):
+    np.testing.assert_allclose(bend_of(variances, older).state(1.0).nodes[:, 0], moves, atol=0.01)
 
 
 def test_what_the_path_was_certain_of_is_dear_to_bend():

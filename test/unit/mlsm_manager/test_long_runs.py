@@ -77,12 +77,9 @@ def standing(groups, forgotten=(), compared=12):
     return Solution(log, parameters, State(nodes, np.zeros(2)))
 
 
-def test_groups_with_enough_older_ones_beside_them_are_superfluous():
-    np.testing.assert_array_equal(np.flatnonzero(superfluous(standing(6), 0, 6)), [3, 4, 5])
-
-
-def test_what_was_forgotten_before_does_not_count():
-    np.testing.assert_array_equal(np.flatnonzero(superfluous(standing(6, forgotten=[1]), 2, 6)), [1, 4, 5])
+@pytest.mark.parametrize(("forgotten", "first", "found"), [([], 0, [3, 4, 5]), ([1], 2, [1, 4, 5])])
+def test_groups_with_enough_older_ones_beside_them_that_were_not_forgotten_are_superfluous(forgotten, first, found):
+    np.testing.assert_array_equal(np.flatnonzero(superfluous(standing(6, forgotten), first, 6)), found)
 
 
 def test_groups_elsewhere_are_kept():

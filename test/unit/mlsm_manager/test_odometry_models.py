@@ -28,12 +28,11 @@ KINDS = list(OdometryKind)
 
 
 def parameters(kind, **changes):
-    profile = MlsmCoreParameters().changed({**profile_values(kind), **changes})
-    return profile.solver_parameters()
+    return MlsmCoreParameters().changed({**profile_values(kind), **changes}).solver_parameters()
 
 
-def model_of(kind, **changes):
-    return parameters(kind, **changes).odometry
+def model_of(kind):
+    return parameters(kind).odometry
 
 
 def some_nodes(model):
@@ -92,8 +91,7 @@ def test_residuals_and_derivatives_agree(kind):
 
 
 def test_what_the_world_s_scale_leaves_open_grows_from_the_map_s_origin():
-    poses = np.array([[0.0, 0.0, 1.0], [30.0, 40.0, 2.0]])
-    covariances = scale_covariance(poses, 0.02)
+    covariances = scale_covariance(np.array([[0.0, 0.0, 1.0], [30.0, 40.0, 2.0]]), 0.02)
     np.testing.assert_allclose(covariances[0], 0.0)
     assert np.sqrt(np.trace(covariances[1])) == pytest.approx(0.02 * 50.0)
 
@@ -109,21 +107,22 @@ def test_reported_positions_say_nothing_where_only_the_heading_counts(kind):
     np.testing.assert_allclose(there.gradient, here.gradient, rtol=1e-9, atol=1e-9)
 
 
+def in_pieces(track, *ends):
+    log = OdometryLog()
+    for end in ends:
+        log.extend(track, end)
+    return log
+
+
 def test_ahead_is_where_a_vehicle_would_be_that_always_went_ahead():
     times = np.linspace(0.0, 10.0, 1001)
     yaw = 0.3 * times
-    timeline = OdometryLog.of(Track(times, np.column_stack([0.0 * times, 0.0 * times, yaw])))
+    track = Track(times, np.column_stack([0.0 * times, 0.0 * times, yaw]))
     expected = np.column_stack([np.sin(yaw), 1.0 - np.cos(yaw)]) / 0.3
-    np.testing.assert_allclose(timeline.motion(times).ahead, expected, atol=1e-4)
-
-
-def test_a_timeline_that_grows_piece_by_piece_goes_on_ahead():
-    times = np.linspace(0.0, 10.0, 101)
-    track = Track(times, np.column_stack([0.0 * times, 0.0 * times, np.sin(times)]))
-    pieces = OdometryLog()
-    for end in (3.0, 3.05, 7.2, 10.0):
-        pieces.extend(track, end)
-    np.testing.assert_allclose(pieces.motion(times).ahead, OdometryLog.of(track).motion(times).ahead, atol=1e-12)
+    logs = OdometryLog.of(track), in_pieces(track, 3.0, 3.05, 7.2, 10.0)
+    whole, pieces = (log.motion(times).ahead for log in logs)
+    np.testing.assert_allclose(whole, expected, atol=1e-4)
+    np.testing.assert_allclose(pieces, whole, atol=1e-12)
 
 
 def stalled(heading):
@@ -136,10 +135,8 @@ def stalled(heading):
 @pytest.mark.parametrize(("heading", "held"), [(0.01, 4.0), (0.0, 0.0)])
 def test_positions_are_held_where_they_stand_while_the_heading_changes(heading, held):
     """From two seconds on; where the heading stands too, the vehicle is at rest."""
-    track, pieces = stalled(heading), OdometryLog()
-    for end in (4.0, 4.05, 7.2, 12.0):
-        pieces.extend(track, end)
-    for log in (pieces, OdometryLog.of(track)):
+    track = stalled(heading)
+    for log in (in_pieces(track, 4.0, 4.05, 7.2, 12.0), OdometryLog.of(track)):
         np.testing.assert_allclose(log.motion(np.array([0.0, 5.0, 12.0])).held, [0.0, 0.0, held], atol=0.15)
 
 
@@ -181,9 +178,8 @@ def test_a_velocity_that_nobody_reported_is_found_with_its_deviation(made, solve
 @pytest.mark.parametrize("kind", [OdometryKind.THRUSTERS, OdometryKind.AUTO])
 def test_a_scale_that_is_30_percent_off_is_found(kind, made):
     solver = followed([reporting(scan, 1.0 / 1.3) for scan in made.scans], parameters(kind))
-    newest = solver.estimates[-1]
     column = solver.odometry.calibrated["odometry_scale"]
-    assert newest.node[column] == pytest.approx(0.3, abs=0.06)
+    assert solver.estimates[-1].node[column] == pytest.approx(0.3, abs=0.06)
 
 
 def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
@@ -195,15 +191,18 @@ def test_a_deviation_grows_while_nothing_is_heard_and_covers_the_error(made):
     assert distance[16] < 3.0 * radii[16]
 
 
-def unheard_beyond(scan, reach):
-    """Return a scan without the echoes from beyond `reach` [m]."""
-    places = scan.track.at(scan.times)[:, :2]
-    return selected(scan, np.hypot(*(scan.points[:, :2] - places).T) < reach)
+def in_canal(count, **changes):
+    """Return a tour of a straight canal, and the solver after its scans without echoes from beyond 30 m."""
+
+    def heard(scan):
+        return selected(scan, np.hypot(*(scan.points - scan.track.at(scan.times)[:, [0, 1, 2, 2]])[:, :2].T) < 30.0)
+
+    canal = tour(count, noise=0.3, path=along_canal, corners=CANAL)
+    return canal, followed(map(heard, canal.scans), parameters(OdometryKind.HEADING, **changes))
 
 
 def test_in_a_straight_canal_the_told_deviation_covers_the_error():
-    canal = tour(45, noise=0.3, path=along_canal, corners=CANAL)
-    solver = followed([unheard_beyond(scan, 30.0) for scan in canal.scans], parameters(OdometryKind.HEADING))
+    canal, solver = in_canal(45)
     told = np.array([estimate.stated_deviation for estimate in solver.estimates])
     distance = np.hypot(*errors_of(solver, canal)[:, :2].T)
     assert (distance < 3.0 * told).all()
@@ -211,9 +210,7 @@ def test_in_a_straight_canal_the_told_deviation_covers_the_error():
 
 
 def test_the_fit_of_a_whole_run_settles_where_nothing_tells_the_way():
-    canal = tour(15, noise=0.3, path=along_canal, corners=CANAL)
-    scans = [unheard_beyond(scan, 30.0) for scan in canal.scans]
-    batch = fit_of(followed(scans, parameters(OdometryKind.HEADING, free_scans=5)).solution)
+    batch = fit_of(in_canal(15, free_scans=5)[1].solution)
     assert batch.converged
     assert batch.steps < 15
 

@@ -1,5 +1,7 @@
 """Echoes that stand alone tell the way along straight walls."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from made_models import HEADING, followed, solver_parameters
@@ -42,37 +44,32 @@ def test_a_strong_echo_far_from_all_others_stands_alone():
     np.testing.assert_allclose(found.bearings, [np.arctan2(-7.0, 6.0)])
 
 
-def test_the_echoes_of_a_wall_do_not_stand_alone():
-    assert len(found_in(scan_of(WALL, np.full(len(WALL), STRONG)))) == 0
+def strong(places):
+    return scan_of(places, np.full(len(places), STRONG))
 
 
-def test_weak_echoes_may_be_speckle_and_are_left_out():
-    assert len(found_in(wall_and([6.0, -7.0], WEAK))) == 0
+ROW = np.column_stack([np.arange(-10.0, 11.0, 5.0), np.full(5, -7.0)])
 
 
-def test_a_scan_without_echoes_has_none():
-    assert len(found_in(scan_of(np.empty((0, 2)), np.empty(0)))) == 0
+@pytest.mark.parametrize(
+    ("scan", "count"),
+    [
+        (strong(WALL), 0),
+        (heard(1, posts=np.array([[100.0, 0.0]]))[0], 0),  # it travels with the vehicle: nothing would seem to move
+        (wall_and([6.0, -7.0], WEAK), 0),
+        (strong(np.empty((0, 2))), 0),
+        (strong(np.vstack([WALL, ROW])), 0),
+        (strong(np.vstack([WALL, [[6.0, -7.0], [6.0, -9.0]]])), 2),
+    ],
+    ids=["a wall", "a wall's end out of range", "speckle", "no echoes", "mistaken for each other", "side by side"],
+)
+def test_posts_are_strong_echoes_beside_surfaces_that_cannot_be_taken_for_each_other(scan, count):
+    assert len(found_in(scan)) == count
 
 
 def test_the_ray_to_the_echo_stands_for_its_normal():
     found = found_in(wall_and([6.0, -7.0], STRONG), np.array([1.0, 0.0]))
     np.testing.assert_allclose(found.normals, [[5.0, -7.0] / np.hypot(5.0, 7.0)])
-
-
-def test_two_posts_side_by_side_are_found():
-    scan = scan_of(np.vstack([WALL, [[6.0, -7.0], [6.0, -9.0]]]), np.full(len(WALL) + 2, STRONG))
-    assert len(found_in(scan)) == 2
-
-
-def test_posts_that_may_be_taken_for_each_other_are_left_out():
-    row = np.column_stack([np.arange(-10.0, 11.0, 5.0), np.full(5, -7.0)])
-    assert not len(found_in(scan_of(np.vstack([WALL, row]), np.full(len(WALL) + 5, STRONG))))
-
-
-def test_the_last_echo_of_a_wall_does_not_stand_alone():
-    """Where the range ends it travels with the vehicle, and would say that nothing moves."""
-    scan = heard(1, posts=np.array([[100.0, 0.0]]))[0]
-    assert not len(found_in(scan))
 
 
 def solver_of(scans, post_confidence):
@@ -123,13 +120,7 @@ def test_in_a_canal_with_clutter_the_told_deviation_covers_the_error(post_confid
 
 def test_a_point_that_no_other_scan_heard_says_nothing():
     bare = heard(6, posts=np.array([[-500.0, 0.0]]))
-    bare[3] = with_echo(bare[3], [3.0, 25.0])
+    points, times = np.vstack([bare[3].points, [[3.0, 25.0, 0.0, STRONG]]]), np.append(bare[3].times, 48.0)
+    bare[3] = replace(bare[3], points=points, times=times, moving=np.ones(len(times), dtype=bool))
     with_lone, without = (solver_of(bare, quality).estimates[-1].pose_covariance for quality in (1.0, 0.0))
     np.testing.assert_allclose(with_lone, without)
-
-
-def with_echo(scan, place):
-    """Return a scan with one more strong echo at `place` (2,) [m] from the vehicle."""
-    points = np.vstack([scan.points, [[*place, 0.0, STRONG]]])
-    times = np.append(scan.times, scan.reference_time)
-    return Scan(points, times, np.ones(len(times), dtype=bool), scan.track, scan.reference_time)

@@ -69,14 +69,11 @@ def test_a_rival_leads_by_the_ratio_of_the_likelihoods_of_all_echoes(mean):
     assert MIXTURE.rival_lead(known(mean, 0.04)) == pytest.approx(lead, abs=1e-3)
 
 
-def test_a_narrow_prior_does_not_count_before_the_echoes_tell_the_unknown():
-    term = MIXTURE.term(known(0.0, 0.12))
-    np.testing.assert_allclose([term.information[0, 0], term.vector[0]], 0.0, atol=1e-9)
-
-
-def test_what_lies_between_two_peaks_is_not_made_more_certain():
-    between = known(0.06, 0.014)
-    assert MIXTURE.term(between).information[0, 0] == 0.0
+@pytest.mark.parametrize(
+    ("mean", "deviation"), [(0.0, 0.12), (0.06, 0.014)], ids=["before echoes tell it", "between two peaks"]
+)
+def test_where_a_narrow_prior_does_not_count_nothing_is_made_more_certain(mean, deviation):
+    assert MIXTURE.term(known(mean, deviation)).information[0, 0] == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize(("information", "vector"), [(0.0, 0.0), (1e4, 3.0)])

@@ -23,27 +23,16 @@ NAMED = ("--odometry", "heading")  # to try whether the vehicle strafes as well 
 
 
 @pytest.mark.parametrize(
-    ("fault", "said"),
-    [
-        (ARM, "the sonar sits +2.0 m ahead and +1.0 m to the left of where tf says"),
-        (TILT, "the sonar's plane is tilted by about 35 deg against tf"),
-        (RANGES, "the range setting changed untold: reported ranges are 0.50 times the true ones"),
+    ("fault", "said", "places"),
+    [  # 2 m ahead is along y of odom, 1 m to the left against x; the first point is from before the change of ranges
+        (ARM, "the sonar sits +2.0 m ahead and +1.0 m to the left of where tf says", [[3.0, 6.0], [5.0, 3.0]]),
+        (TILT, "the sonar's plane is tilted by about 35 deg against tf", [[4.0, 4.3], [5.8, 1.0]]),
+        (RANGES, "the range setting changed untold: reported ranges are 0.50 times the true ones", [[4, 4], [8, 1]]),
     ],
 )
-def test_a_fault_is_told_as_what_the_sonar_did(fault, said):
-    assert fault.text == said
-
-
-@pytest.mark.parametrize(
-    ("fault", "places"),
-    [
-        (ARM, [[3.0, 6.0], [5.0, 3.0]]),  # 2 m ahead is along y of odom, 1 m to the left against x
-        (TILT, [[4.0, 4.3], [5.8, 1.0]]),
-        (RANGES, [[4.0, 4.0], [8.0, 1.0]]),  # the first is from before the change
-    ],
-)
-def test_points_lie_where_they_would_without_the_fault(fault, places):
+def test_a_fault_is_told_as_what_the_sonar_did_and_points_lie_where_they_would_without_it(fault, said, places):
     """The vehicle looks along y of odom at (4, 0) m; its sonar is at (4, 1) m."""
+    assert fault.text == said
     track = Track(np.array([0.0, 3.0]), np.tile([4.0, 0.0, np.pi / 2.0], (2, 1)))
     points = np.array([[4.0, 4.0, 0.0, 1.0], [6.0, 1.0, 0.0, 1.0]])
     moved = fault.placed(Scan(points, np.array([1.0, 2.0]), np.zeros(2, dtype=bool), track, 2.0), SONAR_IN_BASE)
