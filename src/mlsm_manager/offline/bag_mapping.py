@@ -253,17 +253,16 @@ def _run(
 ) -> Run:  # fmt: skip
     poses = replayed.poses
     stored = _stored(sessions[-1].replayed if sessions else replayed, parameters)
-    counts = {"scans": len(replayed.scans), "matched": replayed.matched, "rejected": replayed.rejected}
     if refined is not None:
         poses[REFINED] = refined.poses
         stored = replace(stored, layers=refined.layers)
+    counts = {
+        "scans": len(replayed.scans),
+        "matched": replayed.matched,
+        "rejected": replayed.rejected,
+        "left_out": dict(replayed.refused),
+        "blocks": len(stored.shown),
+    }
     paths = [session.trajectory(color) for session, color in zip(sessions, cycle(FURTHER_COLORS))]
     further = [path for path in paths if len(path.times)]
-    return Run(
-        replayed.times,
-        poses,
-        {**counts, "left_out": dict(replayed.refused), "blocks": len(stored.shown)},
-        stored,
-        trust,
-        further,
-    )
+    return Run(replayed.times, poses, counts, stored, trust, further)

@@ -97,11 +97,9 @@ def _scans(recording: Recording, extractor: EchoExtractor, options: Namespace) -
 
 def _warn_of_z_down(signs: ZDownSigns, options: Namespace) -> None:
     advice = "leave --ned out" if options.ned else "if the odometry counts north, east, down, give --ned"
+    advice += "; if the head turns the other way, set head_turns"
     for sign in signs.lines():
-        print(
-            f"map_bag: {options.bags[0]}: {sign}; {advice}; if the head turns the other way, set head_turns",
-            file=sys.stderr,
-        )
+        print(f"map_bag: {options.bags[0]}: {sign}; {advice}", file=sys.stderr)
 
 
 def progress_bar(total: int, unit: str, name: str) -> tqdm:

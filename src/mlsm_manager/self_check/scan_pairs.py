@@ -71,7 +71,7 @@ class ScanPairs:
         self._sonar, self._corrections = sonar_in_base, corrections
         self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
         self._reported = joined([scan.track for scan in scans]) if scans else None
-        self._tracks = {mirror: mirror.of(self._reported) for mirror in Mirror} if scans else {}
+        self._tracks: Dict[Mirror, Track] = {}
         self._pairs = self._chosen()
         self.begins = np.array([one.times[0] for one in self._heard])
         self.middles = np.array([one.times.mean() for one in self._heard])
@@ -120,6 +120,8 @@ class ScanPairs:
         """Return where the vehicle was at each echo (n, 3) of a scan; mounts change nothing of it."""
         went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0, slips=0.0)
         if (number, went) not in self._ways:
+            if went.mirrored not in self._tracks:
+                self._tracks[went.mirrored] = went.mirrored.of(self._reported)
             times = self._heard[number].times + went.delay
             poses = self._tracks[went.mirrored].at(times) * [went.scale, went.scale, 1.0]
             self._ways[number, went] = composed(self._corrections.at(times), poses) if went.as_solved else poses

@@ -42,10 +42,11 @@ def _beams(angles, ranges):
     ]
 
 
-def _turning(beams):
-    """Return the track of a vehicle that turns on the spot, once in all."""
-    times = np.arange(float(len(beams)))
-    return Track(times, np.column_stack([0.0 * times, 0.0 * times, 2.0 * np.pi * times / len(times)]))
+def _goes_along(angles, ranges):
+    """Return whether something goes along with a vehicle that turns on the spot, once in all."""
+    times = np.arange(float(len(angles)))
+    turning = Track(times, np.column_stack([0.0 * times, 0.0 * times, 2.0 * np.pi * times / len(times)]))
+    return bool(without_companions(_beams(angles, ranges), turning)[1])
 
 
 @pytest.mark.parametrize("leaves", [0.0, 20.0])
@@ -70,16 +71,15 @@ def test_what_goes_along_is_heard_in_sectors_beside_each_other(other_sector, oth
     ranges = np.select(
         [sectors == 5, sectors == other_sector], [5.0, other_range], random.uniform(2.0, 25.0, len(angles))
     )
-    beams = _beams(angles, ranges)
-    assert bool(without_companions(beams, _turning(beams))[1]) == goes_along
+    assert _goes_along(angles, ranges) == goes_along
 
 
 @pytest.mark.parametrize(("turns", "named"), [(4.0, False), (7.0, True)])
 def test_what_the_head_heard_in_few_turns_may_not_go_along(turns, named):
     angles = np.radians(np.arange(0.5, 360.0 * turns, 3.0))
     ahead = np.abs(np.sin(angles / 2.0)) < 0.3
-    beams = _beams(angles, np.where(ahead, 5.0, np.random.RandomState(1).uniform(2.0, 25.0, len(angles))))
-    assert bool(without_companions(beams, _turning(beams))[1]) == named
+    ranges = np.where(ahead, 5.0, np.random.RandomState(1).uniform(2.0, 25.0, len(angles)))
+    assert _goes_along(angles, ranges) == named
 
 
 @pytest.mark.parametrize(("elsewhere", "named"), [(0.1, True), (0.5, False)])
@@ -87,5 +87,4 @@ def test_what_is_heard_as_far_away_in_other_directions_does_not_go_along(elsewhe
     """In a small tank walls are as far away wherever the vehicle turns, in some directions by chance mostly."""
     angles, random = np.radians(np.arange(0.5, 3600.0, 3.0)), np.random.RandomState(1)
     is_near = (np.abs(np.sin(angles / 2.0)) < 0.3) | (random.uniform(size=len(angles)) < elsewhere)
-    beams = _beams(angles, np.where(is_near, 5.0, random.uniform(8.0, 25.0, len(angles))))
-    assert bool(without_companions(beams, _turning(beams))[1]) == named
+    assert _goes_along(angles, np.where(is_near, 5.0, random.uniform(8.0, 25.0, len(angles)))) == named

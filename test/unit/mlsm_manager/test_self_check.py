@@ -258,10 +258,7 @@ def test_a_yaw_that_turns_against_the_echoes_is_a_suspicion_and_one_that_they_fo
 
 
 def test_a_vehicle_that_stands_tells_nothing():
-    signs = ZDownSigns()
-    for scan in _scans(8, TURNED_OVER, turn=0.0):
-        signs.take_scan(scan)
-    assert signs.lines() == []
+    assert z_down_signs(LEVEL, _scans(8, TURNED_OVER, turn=0.0)).lines() == []
 
 
 @pytest.mark.parametrize(("heights", "count"), [([0.0, 3.0, 5.0], 1), ([0.0, -3.0, -5.0], 0), ([-5.0, 0.0, -5.0], 1)])

@@ -23,6 +23,12 @@ def _of_walls(places, track):
     return scans
 
 
+def _measured(times, along, trembles):
+    """Return the track of a vehicle that is at x = `along` (n,) [m], and whose heading `trembles` (n,), or not."""
+    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * trembles
+    return Track(times, np.column_stack([along, np.zeros(len(times)), noise]))
+
+
 def test_a_frozen_odometry_is_named_where_the_echoes_move_and_not_where_the_vehicle_stands():
     frozen = broken.odometry_freezes(WHOLE, MIDDLE, 60.0)
     (cause,) = standing_causes(scans_in(frozen), frozen.track, WHOLE.track.poses)
@@ -46,16 +52,14 @@ def test_a_measured_pose_that_stands_is_named_frozen_where_no_scans_tell_if_it_s
     times = np.arange(0.0, 101.0, 0.1)
     until = np.maximum(np.abs(times - 50.0) - 10.0, 0.0)
     speeds = 0.3 * np.clip(until / max(slowing, 1e-9), 0.0, 1.0)
-    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * (until > 0.0)
-    track = Track(times, np.column_stack([0.1 * np.cumsum(speeds), np.zeros(len(times)), noise]))
+    track = _measured(times, 0.1 * np.cumsum(speeds), until > 0.0)
     assert [cause.text for cause in standing_causes([], track, track.poses)] == ["odometry frozen for 20 s,"] * named
 
 
 def test_a_measured_pose_that_stands_is_named_frozen_where_poses_are_left_out_before():
     """It goes until 60 s, without poses from 20 to 40 s, and stands suddenly."""
     times = np.concatenate([np.arange(0.0, 20.0, 0.1), np.arange(40.0, 101.0, 0.1)])
-    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * (times < 60.0)
-    track = Track(times, np.column_stack([0.3 * np.minimum(times, 60.0), np.zeros(len(times)), noise]))
+    track = _measured(times, 0.3 * np.minimum(times, 60.0), times < 60.0)
     assert [cause.begin for cause in standing_causes([], track, track.poses)] == [pytest.approx(60.0, abs=0.2)]
 
 
@@ -63,11 +67,8 @@ def test_a_measured_pose_that_stands_is_named_frozen_where_poses_are_left_out_be
 def test_a_measured_pose_that_stands_is_named_frozen_unless_scans_show_that_the_vehicle_stands(measured, step, named):
     """Four scans a metre apart while the odometry goes, six `step` [m] apart while it stands, as along a wall."""
     times = np.arange(0.0, 101.0, 0.1)
-    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times)) * (times < 40.0) * measured
-    poses = np.column_stack([0.1 * np.minimum(times, 40.0), np.zeros(len(times)), noise])
-    found = standing_causes(
-        _of_walls([0.0, 1.0, 0.0, 1.0] + [5.0, 5.0 + step] * 3, Track(times, poses)), Track(times, poses), poses
-    )
+    track = _measured(times, 0.1 * np.minimum(times, 40.0), (times < 40.0) * measured)
+    found = standing_causes(_of_walls([0.0, 1.0] * 2 + [5.0, 5.0 + step] * 3, track), track, track.poses)
     assert [cause.begin for cause in found] == [40.0] * named
 
 
@@ -77,11 +78,9 @@ def test_a_pose_that_stands_is_named_frozen_where_it_trembles_at_another_rest(be
     times = np.arange(0.0, 121.0, 0.1)
     other = 60.0 - begin
     rests = np.minimum(*(np.abs(times - rest - 10.0) - 10.0 for rest in (begin, other)))
-    noise = 1e-4 * np.random.RandomState(1).normal(size=len(times))
     stands = (times >= begin) & (times <= begin + 20.0)
-    measured = ~stands if trembles else rests > 0.0
     places = 0.1 * np.cumsum(0.3 * np.clip(rests / 5.0, 0.0, 1.0))
-    track = Track(times, np.column_stack([places, 0.0 * times, noise * measured]))
+    track = _measured(times, places, ~stands if trembles else rests > 0.0)
     assert [cause.begin for cause in standing_causes([], track, track.poses)] == [begin] * named
 
 
