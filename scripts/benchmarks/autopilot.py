@@ -33,8 +33,8 @@ def rows(seconds: float = 60.0, picture: Optional[Path] = None) -> List[Row]:
 
         wait_for_graph()
         rospy.init_node("autopilot_bench", anonymous=True, disable_signals=True)
-        odometry, truth = Arrivals("/odom", Odometry), Arrivals("/ground_truth", Odometry)
-        fixes = Arrivals("/MLSM/pose", PoseWithCovarianceStamped)
+        odometry, truth = _arrivals("/odom", Odometry), _arrivals("/ground_truth", Odometry)
+        fixes = _arrivals("/MLSM/pose", PoseWithCovarianceStamped)
         doubts: List[str] = []
         rospy.Subscriber("/MLSM/status", PositionStatus, lambda one: doubts.extend([one.text] if one.state else []))
         peer = Peer(connection, clock=lambda: rospy.get_rostime().to_nsec())
@@ -44,7 +44,7 @@ def rows(seconds: float = 60.0, picture: Optional[Path] = None) -> List[Row]:
         doubts.clear()
         time.sleep(seconds)
         peer.close()
-    run = Run(_sent(peer), *(one.table() for one in (odometry, truth, fixes)))
+    run = Run(_sent(peer), *map(np.array, (odometry, truth, fixes)))
     if picture is not None:
         _draw(run).savefig(picture, dpi=90)
     if doubts:
@@ -52,27 +52,28 @@ def rows(seconds: float = 60.0, picture: Optional[Path] = None) -> List[Row]:
     return _rows(run)
 
 
-class Arrivals:
-    """When the messages of a topic came, and where they say the vehicle is."""
+def _arrivals(topic: str, kind: type) -> List[Tuple[float, float, float, float]]:
+    """Return a list that grows with each message of a topic.
 
-    def __init__(self, topic: str, kind: type) -> None:
-        import rospy
+    Rows are stamps [s], arrivals by this machine's clock [s], x and y [m] of the vehicle.
+    """
+    import rospy
 
-        self._rows: List[Tuple[float, float, float, float]] = []
-        rospy.Subscriber(topic, kind, self._take, queue_size=1000, tcp_nodelay=True)
+    rows = []
 
-    def _take(self, message: Any) -> None:
+    def take(message: Any) -> None:
         place = message.pose.pose.position
-        self._rows.append((message.header.stamp.to_sec(), time.monotonic(), place.x, place.y))
+        rows.append((message.header.stamp.to_sec(), time.monotonic(), place.x, place.y))
 
-    def table(self) -> np.ndarray:
-        """Return (n, 4): stamps [s], arrivals by this machine's clock [s], x and y [m]."""
-        return np.array(self._rows)
+    rospy.Subscriber(topic, kind, take, queue_size=1000, tcp_nodelay=True)
+    return rows
 
 
 class Run(NamedTuple):
-    """Tables as those of Arrivals. sent: what the autopilot got, x east and y north; two more columns are the stated
-    deviation [m] and the reset counter.
+    """Tables (n, 4) as those of _arrivals.
+
+    sent: what the autopilot got, x east and y north; two more columns are the stated deviation [m] and the reset
+    counter.
     """
 
     sent: np.ndarray
@@ -82,11 +83,10 @@ class Run(NamedTuple):
 
 
 def _sent(peer: Any) -> np.ndarray:
-    pairs = [(at, one) for at, one in zip(peer.arrivals, peer.received) if one.get_type() == "ODOMETRY"]
     rows = [
         (one.time_usec * 1e-6 - peer.ahead_ns * 1e-9, at, one.y, one.x,
          np.sqrt(one.pose_covariance[0] + one.pose_covariance[6]), one.reset_counter)
-        for at, one in pairs
+        for at, one in zip(peer.arrivals, peer.received) if one.get_type() == "ODOMETRY"
     ]  # fmt: skip
     return np.array(rows)
 

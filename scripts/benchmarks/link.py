@@ -16,9 +16,8 @@ import numpy as np
 
 from benchmarks.cable import TOPSIDE, WANTED, delays, demo_behind, versions, wait_for
 from benchmarks.harness import Row
-from benchmarks.programs import module
 
-LISTENER = module("benchmarks.link")
+LISTENER = [sys.executable, "-m", "benchmarks.link"]
 """The command that follows tiles, without the topic and the file to which it writes them."""
 
 

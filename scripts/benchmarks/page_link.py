@@ -23,13 +23,13 @@ from tornado.websocket import websocket_connect
 from benchmarks import cable
 from benchmarks.harness import Row, say
 from benchmarks.link import LISTENER
-from benchmarks.programs import free_port, module
+from benchmarks.programs import free_port
 from benchmarks.web import HELLO, chromium, first_picture
 
 _GROWN = 60.0  # s of mapping before the page is opened
 _CUTS = ("unplugged", True), ("all lost", False)
 _CUT, _BETWEEN = 25.0, 20.0  # s: how long nothing is carried, and until the next cut
-_READER = module("benchmarks.page_link")
+_READER = [sys.executable, "-m", "benchmarks.page_link"]
 """The command that writes what a page gets, "near" the node or behind the cable, "far" from it."""
 _NOW, _TILE = "now", 1  # what is not a tile, and the kind of those that are
 # Adler-32, as zlib has it, of every binary message, with its time.

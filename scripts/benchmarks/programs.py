@@ -56,11 +56,6 @@ def running(host: str = "localhost", before: str = "") -> Iterator[Programs]:
         programs.end()
 
 
-def module(name: str) -> List[str]:
-    """Return the command that runs a module in another process."""
-    return [sys.executable, "-m", name]
-
-
 def wait_for_graph() -> None:
     """Wait until the demo's nodes begin to run."""
     import rosgraph

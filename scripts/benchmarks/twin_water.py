@@ -88,15 +88,9 @@ def _fill_disc(raster: np.ndarray, origin: np.ndarray, centre: np.ndarray, radiu
 def _add_object(
     free: np.ndarray, kept: np.ndarray, origin: np.ndarray, place: np.ndarray, rng: np.random.RandomState
 ) -> None:
+    """Fill a rectangle, a pier, a boat or a post, but for what is `kept` free."""
     angle = rng.choice([0.2, 1.77]) + rng.normal(0.0, 0.1)
     length, width = (rng.uniform(4.0, 14.0), rng.uniform(0.5, 2.0)) if rng.rand() < 0.7 else (0.8, 0.8)
-    _add_hull(free, kept, origin, place, angle, length, width)
-
-
-def _add_hull(
-    free: np.ndarray, kept: np.ndarray, origin: np.ndarray, place: np.ndarray, angle: float, length: float, width: float
-) -> None:
-    """Fill a rectangle that stands at `angle` [rad], but for what is `kept` free."""
     low = np.maximum(((place - length - origin) / RESOLUTION).astype(int), 0)
     high = np.maximum(((place + length - origin) / RESOLUTION).astype(int), 0)
     part, held = (raster[low[0] : high[0], low[1] : high[1]] for raster in (free, kept))

@@ -20,10 +20,10 @@ CLOSE_TO_LIBRARIES = {
     "autopilot_link": ("protocol",),
     "georeferencing": ("origin",),
     "mlsm_manager": (
-        "block_store", "charts", "comparisons", "compiled_distances", "each", "hovering", "joint_solver", "map_export",
-        "map_file", "map_tool", "mlsm_map", "place_search", "report", "run_files", "thesis_matching",
+        "block_store", "charts", "comparisons", "compiled_distances", "each", "joint_solver", "map_export", "map_file",
+        "map_tool", "mlsm_map", "particles", "place_search", "report", "run_files", "shifted_paths", "thesis_matching",
     ),
-    "node_support": ("support_files", "support_memory", "support_numba_cache", "support_parameters"),
+    "node_support": ("support_files", "support_node", "support_numba_cache", "support_parameters"),
     "ping360_driver": ("ping360_protocol",),
     "recordings": ("autopilot_logs", "ping_viewer_next", "recordings_bags", "recordings_inspection", "sweep_shifts"),
     "sonar_driver": ("driver_port",),
@@ -42,21 +42,13 @@ def variables() -> Dict[str, str]:
     PYTHONPATH keeps what it has: ROS's own tools, which tests start, run with the Python that ROS was built for.
     """
     before = os.environ.get("PYTHONPATH", "").split(os.pathsep)
+    # Of the Python that runs this, which env.bash made the one with ROS.
+    ros_folders = [folder for folder in sys.path if folder.endswith("-packages") and "/venv/" not in folder]
     return {
         **os.environ,
         "PYTHONPATH": os.pathsep.join([str(ROOT / "src"), str(ROOT / "scripts"), *filter(None, before)]),
-        "ROS_PYTHON_FOLDERS": os.pathsep.join(_ros_folders()),
+        "ROS_PYTHON_FOLDERS": os.pathsep.join(ros_folders),
     }
-
-
-def _ros_folders() -> List[str]:
-    """Return the module folders of the Python that runs this, which env.bash made the one with ROS."""
-    return [folder for folder in sys.path if folder.endswith("-packages") and "/venv/" not in folder]
-
-
-def _chosen() -> List[str]:
-    files = [f"test/unit/{folder}/test_{name}.py" for folder, names in CLOSE_TO_LIBRARIES.items() for name in names]
-    return ["test/oldest", *files]
 
 
 def main(arguments: List[str]) -> int:
@@ -65,8 +57,9 @@ def main(arguments: List[str]) -> int:
     if status:
         return status
     pytest = ["-m", "pytest", "-p", "fewer_tests", "--hypothesis-profile=few", "-m", "not long"]
+    tests = [f"test/unit/{folder}/test_{name}.py" for folder, names in CLOSE_TO_LIBRARIES.items() for name in names]
     names_paths = any(not word.startswith("-") for word in arguments)
-    command = [str(ENVIRONMENT / "bin/python"), *pytest, *([] if names_paths else _chosen()), *arguments]
+    command = [str(ENVIRONMENT / "bin/python"), *pytest, *([] if names_paths else ["test/oldest", *tests]), *arguments]
     return subprocess.run(command, cwd=str(ROOT), env=variables(), check=False).returncode
 
 
