@@ -173,7 +173,7 @@ class EchoExtractor:
         The strength of a point is the height by which its echo stands out. Bins that a stage removed (NaN) are silent,
         and no echo lies on them. Raises RefusedInput for a cloud that is not organised or of too few beams.
         """
-        if not cloud.is_organized:
+        if not cloud.organized:
             raise RefusedInput("clouds refused", "not organised; subscribe the echo extractor to sonar/scan/polar")
         rows = cloud.points.reshape(cloud.height, -1, 4)
         strengths = np.nan_to_num(rows[..., 3], nan=0.0, posinf=0.0, neginf=0.0)

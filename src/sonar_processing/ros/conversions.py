@@ -96,7 +96,7 @@ def cloud_to_message(cloud: Cloud) -> StampedIntensityCloud:
 def points_to_message(cloud: Cloud) -> PointCloud2:
     """Return the PointCloud2 of a cloud; an organised one says that it may hold points that are not finite."""
     message = point_cloud(cloud.points, cloud.stamp_ns, cloud.frame_id, cloud.height)
-    message.is_dense = message.is_dense and not cloud.is_organized
+    message.is_dense = message.is_dense and not cloud.organized
     return message
 
 

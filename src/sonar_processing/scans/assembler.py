@@ -132,7 +132,9 @@ class RevolutionCollector:
         was silent for long, is forgotten; a sweep ends where the head goes back.
         """
         beam, finished = placed.beam, None
-        if self._beams and _differs(beam, self._beams[-1].beam):
+        last = self._beams[-1].beam if self._beams else beam
+        is_of_other_turn = has_other_bins(beam, last) or beam.frame_id != last.frame_id
+        if is_of_other_turn or servo_moved(beam, last) or long_after(beam, last):
             self.clear()
         elif self._turn.would_pass_start(beam.angle) or self._turn.would_reverse(beam.angle):
             finished = self._finish()
@@ -165,15 +167,6 @@ def turns_of(beams: Sequence[PlacedBeam], fewest: int) -> Iterator[List[PlacedBe
             yield list(beams[index - held : index])
     if len(collector) >= max(longest / 2.0, fewest):
         yield list(beams[len(beams) - len(collector) :])
-
-
-def _differs(beam: Beam, earlier: Beam) -> bool:
-    return (
-        servo_moved(beam, earlier)
-        or long_after(beam, earlier)
-        or has_other_bins(beam, earlier)
-        or beam.frame_id != earlier.frame_id
-    )
 
 
 class MovingState:

@@ -93,7 +93,7 @@ def test_an_organised_cloud_comes_back_organised():
 def test_an_organised_cloud_of_one_beam_comes_back_organised(strengths):
     message = _sent(cloud_to_message(replace(cloud_of(strengths), organized=True)), StampedIntensityCloudArrays)
     cloud = cloud_from_message(message)
-    assert (cloud.is_organized, cloud.height, cloud.broken) == (True, 1, 0)
+    assert (cloud.organized, cloud.height, cloud.broken) == (True, 1, 0)
 
 
 def test_a_cloud_that_says_it_is_finite_and_is_not_is_broken():

@@ -97,7 +97,7 @@ def test_the_cloud_of_a_turn_has_a_row_per_beam_placed_by_its_pose():
     scan = _scan([5.0, 5.0], shifts=[(1.0, 0.0, 0.0), (0.0, 2.0, -3.0)])
     cloud = scan.cloud(SonarToCloudParameters(min_range=0.2))
     rows = cloud.points.reshape(2, BINS, 4)
-    assert (cloud.height, cloud.frame_id, cloud.stamp_ns, cloud.is_organized) == (2, "odom", 2 * SECOND, True)
+    assert (cloud.height, cloud.frame_id, cloud.stamp_ns, cloud.organized) == (2, "odom", 2 * SECOND, True)
     np.testing.assert_allclose(rows[0, 2], [1.25, 0.0, 0.0, 3.0], atol=1e-6)
     heading = [0.25 * math.cos(STEP), 2.0 + 0.25 * math.sin(STEP), -3.0, 3.0]
     np.testing.assert_allclose(rows[1, 2], heading, atol=1e-6)

@@ -143,7 +143,7 @@ def test_an_organised_cloud_keeps_its_shape_and_its_stamps_and_the_one_given_is_
     cloud = cloud_of([10, 100, 20, 200, 30, 90], height=2)
     before = cloud.points.copy()
     kept = Thresholder(ThresholderParameters(mode="FIXED"))(cloud)
-    assert (kept.height, len(kept), kept.is_organized, kept.points.dtype) == (2, 6, True, np.float32)
+    assert (kept.height, len(kept), kept.organized, kept.points.dtype) == (2, 6, True, np.float32)
     assert np.isnan(kept.points).all(axis=1).tolist() == [True, False, True, False, True, False]
     assert kept.time_stamps.tolist() == cloud.time_stamps.tolist()
     np.testing.assert_array_equal(cloud.points, before)

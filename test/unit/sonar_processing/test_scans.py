@@ -202,7 +202,7 @@ def test_min_range_holds_for_every_side_of_a_dispersed_beam():
 @pytest.mark.parametrize("beams", [1, 2])
 def test_an_organised_scan_has_a_row_per_beam_and_nan_for_removed_points(beams):
     scan = _scan_of(*[{}] * beams, keep_organized=True, min_range=1.0)
-    assert (scan.is_organized, scan.height) == (True, beams)
+    assert (scan.organized, scan.height) == (True, beams)
     assert np.isnan(scan.points).all(axis=1).tolist() == [True, False, False] * beams
     assert scan.time_stamps.tolist() == [-1, -1, -1, -2, -2, -2][: 3 * beams]
 
