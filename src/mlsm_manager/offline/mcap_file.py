@@ -1,7 +1,7 @@
 """A mission as an MCAP file of standard messages of ROS 2, for Foxglove and other programs that know no package."""
 
 from pathlib import Path as File
-from typing import Any, List
+from typing import Any, List, Sequence, Tuple
 
 import numpy as np
 
@@ -19,6 +19,8 @@ _LEVELS = {Answer.FINE: _OK, Answer.DOUBTFUL: _WARN, Answer.NOT_MEASURED: _STALE
 _LEVELS_OF_RUNS = {
     RunAnswer.FINE: _OK, RunAnswer.PARTLY: _STALE, RunAnswer.UNMEASURED: _STALE, RunAnswer.DOUBTFUL: _WARN,
 }  # fmt: skip
+_Told = Tuple[str, int, str]
+"""Name, level and text of a DiagnosticStatus."""
 
 
 def write_mcap(file: File, mission: Mission, picture: File) -> None:
@@ -37,7 +39,9 @@ def write_mcap(file: File, mission: Mission, picture: File) -> None:
         bag.write("/map/picture", shown, start)
         for path in (*mission.paths, *mission.further):
             bag.write(f"/path/{path.name.replace(' ', '_').replace(',', '')}", _path(bag, start, path), start)
-        bag.write("/checks", _checks(bag, start, mission), start)
+        checks = [(verdict.name, _LEVELS[verdict.answer], verdict.line()) for verdict in mission.verdicts]
+        trust = "trust", _LEVELS_OF_RUNS[mission.answer], mission.headline
+        bag.write("/checks", _diagnostics(bag, start, [trust, *checks]), start)
         stamped = _poses(bag, mission)
         for scan in mission.scans:
             stamp, flat = round(scan.time * 1e9), np.pad(scan.points, ((0, 0), (0, 2)), mode="constant")
@@ -79,20 +83,6 @@ def _path(bag: McapWriter, stamp_ns: int, path: Path) -> Any:
     return message
 
 
-def _checks(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
-    message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
-    message.status.append(_status(bag, "trust", _LEVELS_OF_RUNS[mission.answer], mission.headline))
-    for verdict in mission.verdicts:
-        message.status.append(_status(bag, verdict.name, _LEVELS[verdict.answer], verdict.line()))
-    return message
-
-
-def _status(bag: McapWriter, name: str, level: int, text: str) -> Any:
-    status = bag.make("diagnostic_msgs/DiagnosticStatus")
-    status.name, status.level, status.message = name, level, text
-    return status
-
-
 def _poses(bag: McapWriter, mission: Mission) -> List[Any]:
     """Return the pose with its covariance, the transform and the doubts at each time that the solver speaks of."""
     told, best = mission.uncertainty, mission.best
@@ -108,20 +98,29 @@ def _poses(bag: McapWriter, mission: Mission) -> List[Any]:
         found += [
             (stamp, "/pose", odometry),
             (stamp, "/tf", tree),
-            (stamp, "/checks/now", _doubts(bag, stamp, mission)),
+            (stamp, "/checks/now", _diagnostics(bag, stamp, _doubts(stamp, mission))),
         ]
     return found
 
 
-def _doubts(bag: McapWriter, stamp_ns: int, mission: Mission) -> Any:
+def _doubts(stamp_ns: int, mission: Mission) -> List[_Told]:
     """Return which checks find that moment doubtful."""
-    message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
+    told = []
     for verdict in mission.verdicts:
         begins, ends = verdict.doubtful.T * 1e9
         is_doubtful = bool(((begins <= stamp_ns) & (stamp_ns <= ends)).any())
         elsewhere = Answer.NOT_MEASURED if verdict.answer is Answer.NOT_MEASURED else Answer.FINE
         answer = Answer.DOUBTFUL if is_doubtful else elsewhere
-        message.status.append(_status(bag, verdict.name, _LEVELS[answer], answer.value))
+        told.append((verdict.name, _LEVELS[answer], answer.value))
+    return told
+
+
+def _diagnostics(bag: McapWriter, stamp_ns: int, told: Sequence[_Told]) -> Any:
+    message = bag.stamped("diagnostic_msgs/DiagnosticArray", bag.time(stamp_ns), "")
+    for name, level, text in told:
+        status = bag.make("diagnostic_msgs/DiagnosticStatus")
+        status.name, status.level, status.message = name, level, text
+        message.status.append(status)
     return message
 
 
