@@ -92,8 +92,13 @@ class Core:
         names = [f"/{name}:={self._namespace}/{name}" for name in ("tf", "tf_static")]
         command = [*starter, str(PACKAGE_ROOT / "nodes/mlsm_core"), f"__ns:={self._namespace}", *names]
         self._node = subprocess.Popen(command, start_new_session=True)
-        self._publishers = {name: publisher(f"{self._namespace}/{name}", kind) for name, kind in self._topics.items()}
-        rospy.wait_for_service(f"{self._namespace}/mlsm_core/get_region", timeout=PATIENCE)
+        try:
+            named = {name: f"{self._namespace}/{name}" for name in self._topics}
+            self._publishers = {name: publisher(topic, self._topics[name]) for name, topic in named.items()}
+            rospy.wait_for_service(f"{self._namespace}/mlsm_core/get_region", timeout=PATIENCE)
+        except (AssertionError, rospy.ROSException):
+            os.killpg(self._node.pid, signal.SIGKILL)
+            raise
 
     def kill(self) -> None:
         """Kill it, and forget the links to it, which would look like those of the next one."""
