@@ -19,7 +19,11 @@ def test_simulated_time_catches_up_with_a_small_delay_and_does_not_race_after_a_
     factor, delay, waits, end, is_late, lost
 ):
     clock = SimpleNamespace(now=100.0)
-    pace = Pace(factor, lambda seconds: vars(clock).update(now=clock.now + seconds), lambda: clock.now)
+
+    def wait(seconds):
+        clock.now += seconds
+
+    pace = Pace(factor, wait, lambda: clock.now)
     clock.now += delay
     assert [pace.wait_for(simulated) for simulated in waits] == [is_late, False][: len(waits)]
     assert (clock.now, pace.lost) == (pytest.approx(100.0 + end), pytest.approx(lost))
