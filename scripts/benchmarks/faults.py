@@ -10,6 +10,7 @@ stated deviations, and "missed" where not.
 """
 
 import re
+import sys
 from collections import Counter
 from dataclasses import replace
 from enum import Enum
@@ -115,7 +116,7 @@ def outcome(found: MappedBag, whole: MappedBag, named: str) -> Outcome:
 
 
 class Broken(NamedTuple):
-    """A recording to be broken. source: its name. whole: as it is. fault: what is broken, with its row."""
+    """A recording to be broken. source: its name. whole: as it is. fault: what is to be broken, by `make`."""
 
     source: str
     whole: Recording
@@ -130,10 +131,10 @@ class Broken(NamedTuple):
 
 
 def broken_recordings(rows: str, sources: Sequence[str], seconds: float, seed: Optional[int]) -> Iterator[Broken]:
-    """Yield those that a regular expression finds in 'SOURCE: FAULT'. Raises RecordingError for an unknown source."""
+    """Yield those that a regular expression finds in 'SOURCE: FAULT'. Ends the program for an unknown source."""
     unknown = sorted(set(sources) - set(SOURCES))
     if unknown:
-        raise RecordingError(f"{', '.join(unknown)}: must be among {', '.join(SOURCES)}")
+        sys.exit(f"scripts/bench: --sources {', '.join(unknown)}: must be among {', '.join(SOURCES)}")
     for name in sources:
         whole = source(name, seconds)
         for fault, (row, make) in faults(whole.seconds, seed).items():

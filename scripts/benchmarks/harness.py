@@ -1,4 +1,4 @@
-"""What every benchmark shares: where recordings are, timing a call, running a node, and printing a table."""
+"""What every benchmark shares: where recordings are, timing a call, and printing what was found."""
 
 import os
 import sys

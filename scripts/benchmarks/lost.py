@@ -7,7 +7,7 @@ times what is stated. After half of a tour some vehicles are where the map has n
 """
 
 import re
-from typing import Iterable, Iterator, NamedTuple, Optional
+from typing import Iterable, Iterator, NamedTuple, Optional, Tuple
 
 import numpy as np
 
@@ -48,27 +48,22 @@ _CASES = {
 }
 
 
-class Start(NamedTuple):
-    """scans: until the position was called good. error, stated: then [m]."""
+def _started(localiser: Localiser, scans: Iterable[Scan], truth: Track) -> Optional[Tuple[int, float, float]]:
+    """Feed a localiser that is lost until it calls its position good; None where it never does.
 
-    scans: int
-    error: float
-    stated: float
-
-
-def _started(localiser: Localiser, scans: Iterable[Scan], truth: Track) -> Optional[Start]:
-    """Feed a localiser that is lost until it calls its position good; None where it never does."""
+    Returns the number of scans until then, and error and stated deviation [m] of the position.
+    """
     for count, scan in enumerate(scans, 1):
         update = localiser.take_scan(scan).scan
         place = localiser.place_now(scan.reference_time, scan.reference_pose)
         if is_called_good(localiser, place, update.provisional):
             error = update.belief.theta[:2] - truth.at(np.array([scan.reference_time]))[0, :2]
-            return Start(count, float(np.hypot(*error)), place.deviation)
+            return count, float(np.hypot(*error)), place.deviation
     return None
 
 
-def _starts(case: Case, count: int) -> Iterator[Optional[Start]]:
-    """Yield what came of `count` starts all along the other tour."""
+def _starts(case: Case, count: int) -> Iterator[Optional[Tuple[int, float, float]]]:
+    """Yield what came of `count` starts all along the other tour; see _started."""
     tour = simulated(f"{case.mapped}_tour", seed=1)
     recording = tour.recording(tour.truth)
     scans, parameters = replay_input(recording, OdometryKind.AUTO)

@@ -1,12 +1,13 @@
 """Where a vehicle finds itself again after its sonar heard nothing for two minutes, while it moved on.
 
 One line per tour, odometry, kind of silence and beginning of it. The error is that of the position against where it
-should be.
+should be. "Wrong but stated as sure" is the share of all fixes since the silence that are wrong and farther off than
+three stated deviations.
 """
 
 import re
 from itertools import product
-from typing import Iterator, NamedTuple
+from typing import Iterator
 
 import numpy as np
 
@@ -28,48 +29,25 @@ _SILENCES = {"no beams": beams_stop, "beams without echoes": deaf, "neither beam
 """What is missing in the recording, and what takes it out."""
 
 
-class Figures(NamedTuple):
-    """Of the fixes after a silence.
-
-    before: error of the last fix before it [m]. way: by which the vehicle was carried on meanwhile [m]. turns: scans
-    until the first fix that claims to be good. first, stated: its error and deviation [m]. end: error of the last one.
-    most: of all from then on. lies: share of all since the silence that are wrong and farther off than three stated
-    deviations.
-    """
-
-    before: float
-    way: float
-    turns: int
-    first: float
-    stated: float
-    end: float
-    most: float
-    lies: float
-
-    def line(self) -> str:
-        """Return them for people."""
-        return (
-            f"{self.way:.0f} m on, error before {self.before:.2f} m; first fix after {self.turns} scans "
-            f"{self.first:.2f} m off with {self.stated:.2f} m stated; then at most {self.most:.2f} m, at the end "
-            f"{self.end:.2f} m; wrong but stated as sure {100.0 * self.lies:.0f} %"
-        )
-
-
-def _figures(found: Replayed, truth: Track, start: float) -> Figures:
-    """Return those of a replay with a silence from `start` [s] on; truth: T_map_base as it should be."""
+def _told(found: Replayed, truth: Track, start: float) -> str:
+    """Return what became of a replay with a silence from `start` [s] on; truth: T_map_base as it should be."""
     fixes = [one for one in found.updates if one.accepted and one.result is not None]
     times = np.array([one.scan.reference_time for one in fixes])
     error = np.hypot(*(np.array([one.result.pose[:2] for one in fixes]) - truth.at(times)[:, :2]).T)
     stated = np.array([np.sqrt(np.trace(one.result.covariance[:2, :2])) for one in fixes])
-    before, after = times < start, times > start + _SECONDS
-    way = float(np.hypot(*np.diff(truth.at(np.array([start, start + _SECONDS]))[:, :2], axis=0)[0]))
-    lies = float((error > np.maximum(_SURE * stated, _WRONG))[after].mean()) if after.any() else np.nan
+    after = times > start + _SECONDS
+    way = np.hypot(*np.diff(truth.at(np.array([start, start + _SECONDS]))[:, :2], axis=0)[0])
+    lies = (error > np.maximum(_SURE * stated, _WRONG))[after].mean() if after.any() else np.nan
+    # From the first fix on that claims to be good.
     known = np.flatnonzero(after & (stated < _FIXED))
-    if not len(known):
-        return Figures(error[before][-1], way, int(after.sum()), np.nan, np.nan, error[-1], np.nan, lies)
-    first = int(known[0])
-    turns = int(after[: first + 1].sum())
-    return Figures(error[before][-1], way, turns, error[first], stated[first], error[-1], error[known].max(), lies)
+    turns = int((after[: known[0] + 1] if len(known) else after).sum())
+    first, first_stated = (error[known[0]], stated[known[0]]) if len(known) else (np.nan, np.nan)
+    most = error[known].max() if len(known) else np.nan
+    return (
+        f"{way:.0f} m on, error before {error[times < start][-1]:.2f} m; first fix after {turns} scans {first:.2f} m "
+        f"off with {first_stated:.2f} m stated; then at most {most:.2f} m, at the end {error[-1]:.2f} m; wrong but "
+        f"stated as sure {100.0 * lies:.0f} %"
+    )
 
 
 def lines(rows: str = ".") -> Iterator[str]:
@@ -87,5 +65,5 @@ def lines(rows: str = ".") -> Iterator[str]:
             if re.search(rows, case):
                 silent = _SILENCES[missing](recording, begin, _SECONDS)
                 scans, parameters = replay_input(silent, kind)
-                found = _figures(replay(silent, scans, parameters, lambda count: None), truth, truth.times[0] + begin)
-                yield f"{case}: {found.line()}"
+                found = replay(silent, scans, parameters, lambda count: None)
+                yield f"{case}: {_told(found, truth, truth.times[0] + begin)}"
