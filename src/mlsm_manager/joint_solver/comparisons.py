@@ -83,7 +83,10 @@ def add_comparisons(
         terms.append((scans, other_scans, information, gradient))
     if terms:
         scans, other_scans, information, gradient = (np.concatenate(each) for each in zip(*terms))
-        equations.add_terms(_columns(scans, other_scans, layout), information, gradient)
+        poses = layout.pose_columns(np.column_stack([scans, scans + 1, other_scans, other_scans + 1]))
+        run = np.broadcast_to(layout.run_start + np.arange(RUN_COLUMNS), (len(scans), RUN_COLUMNS))
+        columns = np.concatenate([poses.reshape(len(scans), -1), run], axis=1)
+        equations.add_terms(columns, information, gradient)
 
 
 def summed(
@@ -120,13 +123,6 @@ def support(pairs: Pairs, sources: PlacedPoints, targets: PlacedPoints, paramete
     residual = np.einsum("na,na->n", sources.places[i] - targets.places[j], targets.normals[j])
     ratio = residual**2 / parameters.variances(sources.slants[i], targets.slants[j])
     return float(0.5 * parameters.weight * (pairs.importance / (1.0 + ratio)).sum())
-
-
-def _columns(scans: np.ndarray, other_scans: np.ndarray, layout: Layout) -> np.ndarray:
-    nodes = np.column_stack([scans, scans + 1, other_scans, other_scans + 1])
-    poses = layout.pose_columns(nodes)
-    run = np.broadcast_to(layout.run_start + np.arange(RUN_COLUMNS), (len(scans), RUN_COLUMNS))
-    return np.concatenate([poses.reshape(len(scans), -1), run], axis=1)
 
 
 _NEAR_IN_TIME = 5  # turns before and after, a minute, in which a vehicle passes a post

@@ -22,11 +22,6 @@ class PriorTerm:
     information: np.ndarray
     vector: np.ndarray
 
-    @classmethod
-    def none(cls, size: int) -> "PriorTerm":
-        """Return the factor 1 of `size` unknowns."""
-        return cls(np.zeros((size, size)), np.zeros(size))
-
     def add(self, equations: NormalEquations, columns: np.ndarray, values: np.ndarray) -> None:
         """Add the factor of unknowns in `columns` (k,), which are at `values` (k,)."""
         gradient = self.information @ values - self.vector
@@ -77,16 +72,14 @@ class PriorMixture:
         own = np.array(self.columns)
         return term.removed_from(Gaussian(node[own], covariance[np.ix_(own, own)]))
 
-    @property
-    def before(self) -> Gaussian:
-        """What is known without any echo."""
-        return Gaussian(self.mean, np.diag(self.widest**2))
-
     def term(self, known: Gaussian) -> PriorTerm:
         """Return what makes of what is known by widest prior and all echoes what is known with the mixture."""
         posteriors, log_weights = zip(*(self._posterior(known, component) for component in self.components))
         logs = np.array(log_weights) - np.logaddexp.reduce(log_weights)
-        weights = np.exp(logs) * self._admitted(known)
+        # Narrow components may be assumed once the echoes tell what they are narrow in.
+        told = np.diag(known.covariance) <= self.told**2
+        admitted = np.array([(told | (one.deviations >= self.widest)).all() for one in self.components])
+        weights = np.exp(logs) * admitted
         weights /= weights.sum()
         means = np.array([posterior.mean for posterior in posteriors])
         mean = weights @ means
@@ -94,11 +87,6 @@ class PriorMixture:
         covariance = sum(weight * own.covariance for weight, own in zip(weights, posteriors))
         covariance = covariance + np.einsum("c,ca,cb->ab", weights, apart, apart)
         return _term_between(known, Gaussian(mean, covariance))
-
-    def _admitted(self, known: Gaussian) -> np.ndarray:
-        """Return which components (c,) may be assumed: narrow ones once the echoes tell what they are narrow in."""
-        told = np.diag(known.covariance) <= self.told**2
-        return np.array([(told | (one.deviations >= self.widest)).all() for one in self.components])
 
     def rival_lead(self, known: Gaussian) -> float:
         """Return by how many nats `rival` is likelier than the components where widest prior and echoes say `known`.
@@ -134,10 +122,10 @@ class AdaptedPrior:
 
     def __init__(self, mixture: Optional[PriorMixture], term: Optional[PriorTerm]) -> None:
         """term: to begin with; None for what is known without any echo."""
-        self._mixture, self.term = mixture, PriorTerm.none(0)
+        self._mixture, self.term = mixture, PriorTerm(np.zeros((0, 0)), np.zeros(0))
         self._is_added = False
         if mixture is not None:
-            self.term = term or mixture.term(mixture.before)
+            self.term = term or mixture.term(Gaussian(mixture.mean, np.diag(mixture.widest**2)))
 
     def add(
         self, equations: NormalEquations, start: int, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]

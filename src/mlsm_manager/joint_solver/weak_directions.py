@@ -131,18 +131,15 @@ def discounted(
     if not len(scans):
         return information, gradient
     _, own = np.unique(scans, return_inverse=True)
-    values, vectors = np.linalg.eigh(_by_translation(information, places[:2], own))
+    x_and_y = places[:2]
+    by_translation = information[:, x_and_y[:, np.newaxis, :, np.newaxis], x_and_y[:, np.newaxis]].sum(axis=(1, 2))
+    sums = np.stack([np.bincount(own, part) for part in by_translation.reshape(-1, 4).T], axis=1).reshape(-1, 2, 2)
+    values, vectors = np.linalg.eigh(sums)
     errors = (_MOST * normal_deviation) ** 2 * values[:, 1]
     lost = np.minimum(1.0, errors / np.maximum(values[:, 0], _NOTHING))[own]
     moves = np.zeros_like(gradient)
-    moves[:, places[:2]] = vectors[own, np.newaxis, :, 0]
+    moves[:, x_and_y] = vectors[own, np.newaxis, :, 0]
     by_move = np.einsum("gab,gb->ga", information, moves)
     share = lost / np.maximum(np.einsum("ga,ga->g", by_move, moves), _NOTHING)
     gradient = gradient - (share * np.einsum("ga,ga->g", gradient, moves))[:, np.newaxis] * by_move
     return information - (share[:, np.newaxis] * by_move)[:, :, np.newaxis] * by_move[:, np.newaxis], gradient
-
-
-def _by_translation(information: np.ndarray, places: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Return the information (s, 2, 2) on translations of s scans; own: (g,) which of them a pair compares."""
-    parts = information[:, places[:, np.newaxis, :, np.newaxis], places[:, np.newaxis]].sum(axis=(1, 2))
-    return np.stack([np.bincount(own, part) for part in parts.reshape(-1, 4).T], axis=1).reshape(-1, 2, 2)

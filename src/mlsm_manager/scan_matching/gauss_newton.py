@@ -87,7 +87,13 @@ class Refiner:
             converged = small and index == narrowest
             if small or iteration % _ITERATIONS_PER_SCALE == 0:
                 index = min(index + 1, narrowest)
-        return self._fit(theta, iteration, converged)
+        normal = self.points.normal(theta, NARROWEST)
+        inflation = self._design_effect(normal)
+        covariance = np.linalg.inv(self.points.weighed(normal, inflation)[0] + self._prior.information)
+        return Fit(
+            theta, covariance, normal.log_likelihood_gain, inflation, self._prior.prior_cost(theta), normal.on_surface,
+            normal.correspondences.distances, iteration, converged,
+        )  # fmt: skip
 
     def gains(self, fit: Fit, moves: np.ndarray) -> np.ndarray:
         """Return (k,) what `fit.gain` would be if it had ended at its state moved by `moves` (k, 3)."""
@@ -118,12 +124,3 @@ class Refiner:
         whitening = np.linalg.inv(normal.information + self._prior.information)
         independent = max(float(np.trace(whitening @ normal.information)), 1e-9)
         return float(np.clip(np.trace(whitening @ (sums.T @ sums)) / independent, 1.0, _GREATEST_INFLATION))
-
-    def _fit(self, theta: np.ndarray, iterations: int, converged: bool) -> Fit:
-        normal = self.points.normal(theta, NARROWEST)
-        inflation = self._design_effect(normal)
-        covariance = np.linalg.inv(self.points.weighed(normal, inflation)[0] + self._prior.information)
-        return Fit(
-            theta, covariance, normal.log_likelihood_gain, inflation, self._prior.prior_cost(theta), normal.on_surface,
-            normal.correspondences.distances, iterations, converged,
-        )  # fmt: skip
