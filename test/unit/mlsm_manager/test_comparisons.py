@@ -1,21 +1,29 @@
 """Comparisons of points: which neighbours, how much each counts, and what they say, as a few lines of numpy find it."""
 
-from dataclasses import fields, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from made_harbour import SONAR_IN_BASE, logged, tour
-from made_models import DVL, HEADING, THRUSTERS, UNAIDED, points_of, solution_of, solver_parameters, some_state
+from made_models import (
+    DVL,
+    HEADING,
+    THRUSTERS,
+    UNAIDED,
+    followed,
+    points_of,
+    solution_of,
+    solver_parameters,
+    some_state,
+)
 
 from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, Neighbours, summed
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs, scattered_terms, weighed_pairs
-from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE
 from mlsm_manager.joint_solver.odometry_log import as_complex
 from mlsm_manager.joint_solver.placement import PlacedPoints
-from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import solved_path
 from mlsm_manager.joint_solver.surface_points import ramp
 from mlsm_manager.joint_solver.weak_directions import discounted
@@ -90,13 +98,12 @@ def test_comparisons_are_summed_for_each_pair_of_scans(seed, count, scans):
 
 @pytest.mark.parametrize("column", range(3))
 def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
-    state, rows = some_state(log), log.surfaces.rows(0, 3)
+    state, points = some_state(log), log.surfaces.heard(0, 3)
     pairs = Pairs(np.arange(20), np.arange(150, 170), np.ones(20))
-    before = solution_of(log, MODELS[0], state).placed(log.surfaces.points(rows))
+    before = solution_of(log, DVL, state).placed(points)
     _, jacobian = linearised(pairs, before, before)
-    moved = state.copy()
-    moved.nodes[0, column] += STEP
-    after = solution_of(log, MODELS[0], moved).placed(log.surfaces.points(rows))
+    state.nodes[0, column] += STEP
+    after = solution_of(log, DVL, state).placed(points)
     moves = after.places[pairs.rows] - before.places[pairs.rows]
     change = np.einsum("na,na->n", moves, before.normals[pairs.neighbours])
     np.testing.assert_allclose(change / STEP, jacobian[:, column], atol=1e-4)
@@ -104,15 +111,10 @@ def test_residuals_follow_the_nodes_as_their_derivatives_say(log, column):
 
 @pytest.mark.parametrize("normal_deviation", [0.0, 0.2])
 def test_comparisons_do_not_tell_how_the_whole_map_is_turned(log, normal_deviation):
-    rng, solution, parameters = (
-        np.random.RandomState(2),
-        solution_of(log, MODELS[0], some_state(log)),
-        solver_parameters(),
-    )
-    points = solution.placed(log.surfaces.heard(0, 3))
-    places = solution.node_places(np.arange(log.scan_count + 1))
+    solution, parameters = solution_of(log, DVL, some_state(log)), solver_parameters()
+    points, places = solution.placed(log.surfaces.heard(0, 3)), solution.places
     rows = np.arange(len(points))
-    pairs = Pairs(rows, rng.permutation(rows), np.ones(len(rows)))
+    pairs = Pairs(rows, np.random.RandomState(2).permutation(rows), np.ones(len(rows)))
     scans, others, information, gradient = summed(pairs, points, points, parameters, parameters.cut)
     left, _ = discounted(information, gradient, scans, PLACES, normal_deviation)
     turn = np.column_stack([-places[:, 1], places[:, 0], np.ones(len(places))])
@@ -164,20 +166,16 @@ def test_the_path_goes_on_beyond_the_nodes_as_the_odometry_does(log, odometry):
 
 
 def test_no_points_lie_nowhere(log):
-    nothing = solution_of(log, MODELS[0], some_state(log)).placed(log.surfaces.heard(0, 0))
-    assert [len(getattr(nothing, field.name)) for field in fields(nothing)] == [0] * len(fields(nothing))
+    nothing = solution_of(log, DVL, some_state(log)).placed(log.surfaces.heard(0, 0))
+    assert {len(array) for array in vars(nothing).values()} == {0}
 
 
 def test_a_sonar_s_place_may_be_a_column_of_a_matrix_as_live_nodes_have_it():
     T_base_sonar = np.eye(4)
     T_base_sonar[:2, 3] = SONAR_IN_BASE
-    solvers = [
-        LiveSolver(solver_parameters(sonar_delay_deviation=1.0), RunLog(some))
-        for some in (SONAR_IN_BASE, T_base_sonar[:2, 3])
-    ]
-    for scan in tour(2).scans:
-        expected, found = (solver.add(scan) for solver in solvers)
-    np.testing.assert_array_equal(found.node, expected.node)
+    scans, places = tour(2).scans, (SONAR_IN_BASE, T_base_sonar[:2, 3])
+    found, expected = (followed(scans, sonar_in_base=place).state.nodes for place in places)
+    np.testing.assert_array_equal(found, expected)
 
 
 @given(st.integers(0, 10**6), st.integers(0, 100))
@@ -230,18 +228,9 @@ def looked_at_all(places, cut):
     apart[SCANS[:, np.newaxis] == SCANS] = np.inf
     result = np.zeros_like(apart)
     for of_block in (SCANS < BLOCK_SCANS, SCANS >= BLOCK_SCANS):
-        nearest = np.where(of_block, apart, np.inf).min(axis=1)
-        share = (
-            np.maximum(1.0 - (apart - nearest[:, np.newaxis]) / TIE, 0.0) * of_block * (nearest < cut)[:, np.newaxis]
-        )
+        nearest = np.where(of_block, apart, np.inf).min(axis=1, keepdims=True)
+        share = np.maximum(1.0 - (apart - nearest) / TIE, 0.0) * of_block * (nearest < cut)
         result += share / np.maximum(share.sum(axis=1, keepdims=True), 1e-12)
-    return result
-
-
-def as_matrix(found, count):
-    rows, neighbours, _, shares = found
-    result = np.zeros((count, count))
-    np.add.at(result, (rows, neighbours), shares)
     return result
 
 
@@ -255,8 +244,10 @@ def test_neighbours_are_what_a_look_at_all_points_says_however_far_these_move_an
     lists = Neighbours(placed(places), BLOCK_SCANS)
     for move, cut in [(0.0, CUT), *moves]:
         places = places + rng.normal(0.0, move, places.shape) + common
-        found = lists.within(placed(places), placed(places), cut)
-        np.testing.assert_allclose(as_matrix(found, len(places)), looked_at_all(places, cut), atol=1e-9)
+        rows, neighbours, _, shares = lists.within(placed(places), placed(places), cut)
+        found = np.zeros((len(places), len(places)))
+        np.add.at(found, (rows, neighbours), shares)
+        np.testing.assert_allclose(found, looked_at_all(places, cut), atol=1e-9)
 
 
 def test_no_neighbour_takes_over_at_once():
@@ -265,8 +256,8 @@ def test_no_neighbour_takes_over_at_once():
     shares = []
     for place in np.linspace(-0.04, 0.04, 81):
         source = placed(np.array([[place, 0.0]]), np.array([9]))
-        rows = Neighbours(others, BLOCK_SCANS).within(source, others, CUT)
-        shares.append(rows[3][rows[1] == 0].sum())
+        _, neighbours, _, found = Neighbours(others, BLOCK_SCANS).within(source, others, CUT)
+        shares.append(found[neighbours == 0].sum())
     steps = np.diff(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
     assert steps.min() >= 0.0

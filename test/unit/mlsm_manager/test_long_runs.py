@@ -4,7 +4,7 @@ import sys
 
 import numpy as np
 import pytest
-from made_harbour import SONAR_IN_BASE, logged, tour
+from made_harbour import SONAR_IN_BASE, deaf, logged, tour
 from made_models import followed, solver_parameters
 from numba._dispatcher import compute_fingerprint
 
@@ -133,8 +133,7 @@ def test_a_run_that_forgets_is_judged_as_one_that_does_not(forgetful):
 @pytest.mark.long
 def test_a_run_goes_on_after_a_silence_that_is_longer_than_what_it_keeps(forgetful):
     made = tour(58, path=round_and_round)
-    silent = [scan.without_points(scan.reference_time) for scan in made.scans[12:56]]
-    session = session_of([*made.scans[:12], *silent, *made.scans[56:]], forgetful)
+    session = session_of(deaf(made.scans, range(12, 56)), forgetful)
     newest = session.solver.estimates[-1]
     assert np.hypot(*(newest.T_map_base - made.truth.at(newest.time))[:2]) < 0.5
     assert {verdict.name for verdict in session.verdicts()}
@@ -142,7 +141,7 @@ def test_a_run_goes_on_after_a_silence_that_is_longer_than_what_it_keeps(forgetf
 
 def test_scans_are_kept_for_storing_only_as_many_as_are_stored(monkeypatch):
     monkeypatch.setattr(joint_session, "_MOST_STORED", 5)
-    session = JointSession.begun(solver_parameters(), SONAR_IN_BASE, np.zeros(3), None, np.empty((0, 2)))
+    session = session_of([], solver_parameters())
     for number, scan in enumerate(SCANS[:8], start=1):
         session.add(scan)
         assert session.may_be_stored == (number <= 5)
