@@ -198,7 +198,10 @@ class ThesisMatcher:
             counted = belonging(places[:, :2], blocks.mean[found, :2], blocks.resolution)
             moved = _moved(fit, scan, places[:, :2], blocks.mean[found, :2], counted)
             there = moved.placed(scan.points)
-            moved = moved._replace(error=_error(there[counted, :2], blocks.take(found[counted])))
+            # The mean distance from places to their blocks, zero for those inside a block's spread (thesis 6.5.6).
+            distance = np.linalg.norm(there[counted, :2] - blocks.mean[found[counted], :2], axis=1)
+            spread = np.sqrt(blocks.variance[found[counted], :2].sum(axis=1))
+            moved = moved._replace(error=float(np.where(distance <= spread, 0.0, distance).mean()))
             # The search along the movement pulls on for ever: a moving scan ends where its error is least.
             if scan.moving.any() and moved.error > fit.error:
                 return fit._replace(iterations=moved.iterations)
@@ -225,13 +228,6 @@ def _moved(fit: _Fit, scan: Scan, places: np.ndarray, targets: np.ndarray, count
         return fit._replace(correction=correction, iterations=fit.iterations + 1)
     shifts, slope = translate_segments(scan.times, scan.moving, targets - places, counted)
     return fit._replace(shifts=fit.shifts + shifts, slope=fit.slope + slope, iterations=fit.iterations + 1)
-
-
-def _error(places: np.ndarray, blocks: Blocks) -> float:
-    """Return the mean distance from places to their blocks, zero for those inside a block's spread (thesis 6.5.6)."""
-    distance = np.linalg.norm(places - blocks.mean[:, :2], axis=1)
-    spread = np.sqrt(blocks.variance[:, :2].sum(axis=1))
-    return float(np.where(distance <= spread, 0.0, distance).mean())
 
 
 def _result(status: MatchStatus, scan: Scan, belief: Belief, fit: _Fit, start: float) -> MatchResult:

@@ -69,12 +69,15 @@ def that_heard(scan: Scan, truth: Track, places: np.ndarray) -> Scan:
     return replace(scan, points=points)
 
 
+def placed_by(scan: Scan, track: Track) -> Scan:
+    """Return a scan as it is when the odometry reports `track`."""
+    moves = move_of(scan.track.at(scan.times), track.at(scan.times))
+    return replace(scan, points=transformed(moves, scan.points), track=track)
+
+
 def reporting(scan: Scan, factor: float) -> Scan:
     """Return a scan whose odometry reports distances that are `factor` times the true ones."""
-    track = scan.track
-    scaled = Track(track.times, track.poses * [factor, factor, 1.0])
-    moves = move_of(track.at(scan.times), scaled.at(scan.times))
-    return replace(scan, points=transformed(moves, scan.points), track=scaled)
+    return placed_by(scan, scan.track.with_poses(scan.track.poses * [factor, factor, 1.0]))
 
 
 def without_positions(scan: Scan) -> Scan:
@@ -86,7 +89,7 @@ def with_wild_odometry(scan: Scan) -> Scan:
     """Return a scan that leads to no solution."""
     poses = scan.track.poses.copy()
     poses[::2] = 1e200
-    return replace(scan, track=Track(scan.track.times, poses))
+    return replace(scan, track=scan.track.with_poses(poses))
 
 
 def ahead(times: np.ndarray) -> np.ndarray:

@@ -1,5 +1,7 @@
 """Scans of a straight canal with posts in it, heard by a vehicle that goes along it and knows its heading only."""
 
+from dataclasses import replace
+
 import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
@@ -27,19 +29,14 @@ def heard(turns, posts=POSTS, seed=0):
 
 
 def cluttered(scans):
-    """Return the scans with ten strong echoes more each, anywhere in 50 x 26 m around the vehicle."""
+    """Yield the scans with ten strong echoes more each, anywhere in 50 x 26 m around the vehicle."""
     rng = np.random.RandomState(0)
-    return [_with_clutter(scan, rng.uniform([-25.0, -13.0], [25.0, 13.0], (10, 2)), rng) for scan in scans]
-
-
-def _with_clutter(scan, places, rng):
-    points = np.column_stack([places, np.zeros(len(places)), np.full(len(places), _STRENGTH)])
-    times = np.append(scan.times, rng.uniform(scan.times[0], scan.times[-1], len(places)))
-    order = np.argsort(times, kind="stable")
-    return Scan(
-        np.vstack([scan.points, points])[order], times[order], np.ones(len(times), dtype=bool), scan.track,
-        scan.reference_time,
-    )  # fmt: skip
+    for scan in scans:
+        places = rng.uniform([-25.0, -13.0], [25.0, 13.0], (10, 2))
+        points = np.vstack([scan.points, np.column_stack([places, np.zeros(10), np.full(10, _STRENGTH)])])
+        times = np.append(scan.times, rng.uniform(scan.times[0], scan.times[-1], 10))
+        order = np.argsort(times, kind="stable")
+        yield replace(scan, points=points[order], times=times[order], moving=np.ones(len(times), dtype=bool))
 
 
 def _scan(start, track, posts, rng):
