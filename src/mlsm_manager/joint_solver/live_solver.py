@@ -114,13 +114,10 @@ class LiveSolver:
         return Solution(self.log, self.parameters, self.state, self.submaps, self._known, term, self.fixes)
 
     @property
-    def told(self) -> Optional[Gaussian]:
-        """What the echoes alone tell of the unknowns of a mixture of priors; None without a mixture or estimates."""
-        mixture = self.odometry.mixture
-        if mixture is None or not self.estimates:
-            return None
+    def told(self) -> Gaussian:
+        """What the echoes so far alone tell of the unknowns of a mixture of priors, which the model must have."""
         newest = self.estimates[-1]
-        return mixture.without(newest.prior_term, newest.node, newest.covariance)
+        return self.odometry.mixture.without(newest.prior_term, newest.node, newest.covariance)
 
     def expected_deviations(self, estimates: Sequence[LiveEstimate]) -> np.ndarray:
         """Return by how much (n,) [m] the positions of `estimates` are uncertain whatever the water tells.
@@ -144,7 +141,9 @@ class LiveSolver:
         return float(self.estimates[-1].deviations[SCALE])
 
     def add(self, scan: Scan, fix: Optional[Fix] = None) -> LiveEstimate:
-        """Put the next scan, or its parts (`parts_per_turn`), into the log, and return what `solve` says of it.
+        """Put the next scan into the log, and return what `solve` says of it.
+
+        It may be cut into parts (`parts_per_turn`), each then a scan of the log with an estimate of its own.
 
         Raises RefusedInput, and stays as it is, for a scan that does not end later than the one before, or with which
         the fit has no finite solution.

@@ -72,7 +72,10 @@ def agreed(loops: Sequence[Loop]) -> List[Loop]:
 
 
 def pulls_of(loops: Sequence[Loop], layout: Layout, nodes: np.ndarray, start: State) -> Iterator[Residuals]:
-    """Return that the scans of `loops` are moved by their shifts against `start`, in which these were found."""
+    """Return that the scans of `loops` are moved by their shifts against `start`, in which these were found.
+
+    nodes: (n, width) as they are now.
+    """
     ends = np.array([[loop.scan + 1, loop.older + 1] for loop in loops])
     now, then = (some[ends[:, 0], :2] - some[ends[:, 1], :2] for some in (nodes, start.nodes))
     return moves_between(layout, ends, now - then - np.array([loop.place.shift for loop in loops]), _DEVIATION)

@@ -142,8 +142,8 @@ def changes_of(
 ) -> Residuals:  # fmt: skip
     """Return how unknowns of `nodes` (n, width) at `times` [s] change, by their columns.
 
-    walks: deviations [1/sqrt(s)] of those that only walk. changes: of others. compass: of which YAW is the error, if
-    any.
+    walks: deviations [1/sqrt(s)] of unknowns that only walk. changes: those of others. compass: that of which YAW is
+    the error; None without one.
     """
     durations = np.diff(times)
     one = np.ones(len(durations))

@@ -104,7 +104,10 @@ def prior_of(columns: np.ndarray, off: np.ndarray, deviation: np.ndarray, held: 
 
 
 def moves_between(layout: Layout, ends: np.ndarray, errors: np.ndarray, deviation: float) -> Iterator[Residuals]:
-    """Yield in x and y that moves from the second to the first of two nodes `ends` (m, 2) err by `errors` (m, 2)."""
+    """Yield in x and y by how much moves from the second to the first of two nodes `ends` (m, 2) are off.
+
+    errors: (m, 2) m in map. deviation: m, in each direction.
+    """
     columns = layout.pose_columns(ends)
     jacobian, weights = np.tile([1.0, -1.0], (len(ends), 1)), np.full(len(ends), deviation**-2.0)
     for axis in (0, 1):

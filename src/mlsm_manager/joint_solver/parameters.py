@@ -72,8 +72,8 @@ def _none_given() -> OdometryModel:
 class SolverParameters(JointSolverParameters):
     """All parameters of a run. odometry: the model of the vehicle's motion, with its own parameters.
 
-    A turn of the head is one scan of the run, or `parts_per_turn` of them. node_search: what finds the nodes of these;
-    None where the odometry reports distances.
+    A turn of the head is one scan of the run, or `parts_per_turn` of them. node_search: what finds the nodes of these,
+    a hovering.ParticleFilter; None where the odometry reports distances.
     """
 
     range_scale_error: float = parameter(0.0, "true range over reported range, minus 1", low=-0.5, high=1.0)
