@@ -17,8 +17,8 @@ from mlsm_manager.joint_solver.run_log import PointTable
 from mlsm_manager.joint_solver.surface_points import ramp, slants_of
 from mlsm_manager.joint_solver.weak_directions import discounted
 
-# m by which a neighbour may be farther than the nearest one and still count in part. Were it 0, the nearest one would be
-# decided by the last bit where two are equally near; more would compare each point with more neighbours.
+# m by which a neighbour may be farther than the nearest one and still count in part. Were it 0, the nearest one would
+# be decided by the last bit where two are equally near; more would compare each point with more neighbours.
 TIE = 0.05
 FADING = 0.8  # share of the cut from which on a pair fades out, so that none appears at once
 COSINE_FADING = 0.1  # the same for the cosine between normals, above the least one

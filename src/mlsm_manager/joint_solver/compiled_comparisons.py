@@ -45,7 +45,9 @@ def weighed_pairs(found, sources, targets, limits):
     pairs do not count, and up to which they count fully; likewise the cosines between both normals.
     """
     rows, neighbours, distances, shares = found
-    (normals, qualities), (other_normals, other_qualities), (cut, near, least, full) = sources, targets, limits
+    normals, qualities = sources
+    other_normals, other_qualities = targets
+    cut, near, least, full = limits
     own, met, importance = np.empty(len(rows), np.int64), np.empty(len(rows), np.int64), np.empty(len(rows))
     made = 0
     for pair in range(len(rows)):
@@ -173,7 +175,9 @@ def summed_comparisons(pairs, sources, targets, noise, widening):
     which scans heard them. noise: the variance of a comparison is its first member, and its second one times the sum of
     both squared slants; the third one is the weight of each. widening: of the robust kernel.
     """
-    (rows, neighbours, importance), (points, source_scans), (other_points, target_scans) = pairs, sources, targets
+    rows, neighbours, importance = pairs
+    points, source_scans = sources
+    other_points, target_scans = targets
     constant, by_slant, whole_weight = noise
     group_of, scans, other_scans = _groups_of(rows, neighbours, source_scans, target_scans)
     order, starts = _grouped(group_of, len(scans))
