@@ -1,6 +1,7 @@
 """Small damages to the bytes of a file, and to the words and numbers of a text."""
 
 import re
+from functools import partial
 
 import numpy as np
 
@@ -57,14 +58,6 @@ def _replaced(pattern: "re.Pattern[bytes]", data: bytes, rng: np.random.Generato
     return data[: one.start()] + _ODD[rng.integers(len(_ODD))] + data[one.end() :]
 
 
-def _other_number(data: bytes, rng: np.random.Generator) -> bytes:
-    return _replaced(_NUMBER, data, rng)
-
-
-def _other_word(data: bytes, rng: np.random.Generator) -> bytes:
-    return _replaced(_WORD, data, rng)
-
-
 def _without_line(data: bytes, rng: np.random.Generator) -> bytes:
     lines = data.splitlines(keepends=True)
     if lines:
@@ -78,4 +71,5 @@ def _deep(data: bytes, rng: np.random.Generator) -> bytes:
 
 
 _DAMAGES = (_cut, _without_part, _part_twice, *3 * (_other_bytes, _great_number))
-_TEXT_DAMAGES = (*10 * (_other_number, _other_word), _without_line, _deep)
+_OTHER_WORDS = (partial(_replaced, _NUMBER), partial(_replaced, _WORD))
+_TEXT_DAMAGES = (*10 * _OTHER_WORDS, _without_line, _deep)
