@@ -1,5 +1,6 @@
 """Beams of logs: `.852` files of Imagenex, what both Ping Viewers write of a Ping360, and tables."""
 
+from contextlib import suppress
 from os.path import getmtime
 from pathlib import Path
 from typing import Callable, Dict, Iterator, List, Optional, Tuple
@@ -48,9 +49,14 @@ def _reader(path: Path) -> Optional[_Reader]:
         return _imagenex_beams
     if is_ping_viewer_next(path):
         return _ping_viewer_next_beams
-    if _is_beam_table(path):
-        return _beams_of_table
-    return _ping_viewer_beams if path.is_file() and _is_ping_viewer_log(path) else None
+    with suppress(RecordingError):
+        if is_table(path) and "bins" in next(rows_of(path)):
+            return _beams_of_table
+    if path.is_file():
+        with suppress(NoLogError):
+            PingViewerLog(first_bytes(path, _BEGINNING))
+            return _ping_viewer_beams
+    return None
 
 
 def _imagenex_beams(path: Path) -> RecordedBeams:
@@ -77,15 +83,6 @@ def _imagenex_beams(path: Path) -> RecordedBeams:
         raise RecordingError(f"{path}: not a .852 log, no ping in it")
     notes = [] if stamped else [f"{path.name} states no time: the first ping counts as taken when the file was written"]
     return RecordedBeams(beams, [False] * len(beams), pings - len(beams), notes)
-
-
-def _is_ping_viewer_log(path: Path) -> bool:
-    """Return whether a file begins as a log of Ping Viewer does; False for one that cannot be read."""
-    try:
-        PingViewerLog(first_bytes(path, _BEGINNING))
-    except NoLogError:
-        return False
-    return True
 
 
 def _ping_viewer_beams(path: Path) -> RecordedBeams:
@@ -160,15 +157,6 @@ def _beam_of(found: HeadBeam, time: float) -> Beam:
 _ANGLES = {"angle": 1.0, "angle_deg": np.pi / 180.0}  # rad
 
 
-def _is_beam_table(path: Path) -> bool:
-    if not is_table(path):
-        return False
-    try:
-        return "bins" in next(rows_of(path), [])
-    except RecordingError:
-        return False
-
-
 def _beams_of_table(path: Path) -> RecordedBeams:
     """Return the beams of a table as docs/sonars.md describes it. Raises RecordingError for one without a column."""
     names, *rows = rows_of(path)
@@ -178,16 +166,13 @@ def _beams_of_table(path: Path) -> RecordedBeams:
         raise RecordingError(f"{path}: has the columns {', '.join(names)}; needs time, angle, range and, last, bins")
     beams, refused, reason = [], 0, ""
     for line, row in enumerate(rows, start=2):
+        cells, bins = dict(zip(names, row)), row[len(names) - 1 :]
         try:
-            beams.append(_beam_of_row(dict(zip(names, row)), angle, row[len(names) - 1 :]))
+            strengths = np.clip([float(value) for value in " ".join(bins).split()], 0, 255).astype(np.uint8)
+            length = float(cells["range"]) / max(strengths.size, 1)
+            stamp = round(float(cells["time"]) * 1e9)
+            beams.append(Beam(stamp, _FRAME, float(cells[angle]) * _ANGLES[angle], strengths, length))
         except (RefusedInput, ValueError, KeyError, OverflowError) as error:
             refused, reason = refused + 1, reason or f"line {line}: {error}"
     notes = [f"{refused} rows of {path.name} hold no beam, the first is {reason}"] if refused else []
     return RecordedBeams(beams, [False] * len(beams), refused, notes)
-
-
-def _beam_of_row(cells: Dict[str, str], angle: str, bins: List[str]) -> Beam:
-    """Return the beam of a row. Raises RefusedInput, ValueError and KeyError for a row that holds none."""
-    strengths = np.clip([float(value) for value in " ".join(bins).split()], 0, 255).astype(np.uint8)
-    length = float(cells["range"]) / max(strengths.size, 1)
-    return Beam(round(float(cells["time"]) * 1e9), _FRAME, float(cells[angle]) * _ANGLES[angle], strengths, length)
