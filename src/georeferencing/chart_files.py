@@ -25,14 +25,18 @@ class ChartedPath:
 def geojson(origin: Origin, path: ChartedPath, marks: Sequence[Mark]) -> bytes:
     """Return a collection of features: the path as a line with its times, and marks as points."""
     properties = {"name": path.name, "times": np.round(path.times, 3).tolist()}
-    line = _feature("LineString", _longitude_first(origin, path.points), properties)
-    return _collection([line, *_points(marks, origin)])
+    return marks_geojson(marks, origin, [_feature("LineString", _longitude_first(origin, path.points), properties)])
 
 
-def marks_geojson(marks: Sequence[Mark], origin: Optional[Origin]) -> bytes:
-    """Return the marks as points; in metres of the map, which the file says, without an origin."""
+def marks_geojson(marks: Sequence[Mark], origin: Optional[Origin], before: Sequence[Any] = ()) -> bytes:
+    """Return the features `before` and the marks as points, each with its place x, y and z [m] in the map; in metres
+    of the map, which the file says, without an origin.
+    """
     told = {} if origin is not None else {"coordinates": "metres of the map, x and y; its origin is not known"}
-    return _collection(_points(marks, origin), **told)
+    places = _places(marks).tolist() if origin is None else _longitude_first(origin, _places(marks))
+    points = [_feature("Point", place, asdict(mark)) for mark, place in zip(marks, places)]
+    collection = {"type": "FeatureCollection", **told, "features": [*before, *points]}
+    return (json.dumps(collection, ensure_ascii=False) + "\n").encode()
 
 
 def kml(origin: Origin, path: ChartedPath, marks: Sequence[Mark]) -> bytes:
@@ -53,16 +57,6 @@ def _places(marks: Sequence[Mark]) -> np.ndarray:
 
 def _longitude_first(origin: Origin, points: np.ndarray) -> List[List[float]]:
     return np.round(origin.degrees(points)[:, ::-1], _DIGITS).tolist()
-
-
-def _points(marks: Sequence[Mark], origin: Optional[Origin]) -> List[Dict[str, Any]]:
-    """Return the marks, each with its place x, y and z [m] in the map among its properties."""
-    places = _places(marks).tolist() if origin is None else _longitude_first(origin, _places(marks))
-    return [_feature("Point", place, asdict(mark)) for mark, place in zip(marks, places)]
-
-
-def _collection(features: List[Dict[str, Any]], **told: str) -> bytes:
-    return (json.dumps({"type": "FeatureCollection", **told, "features": features}, ensure_ascii=False) + "\n").encode()
 
 
 def _feature(kind: str, coordinates: Any, properties: Dict[str, Any]) -> Dict[str, Any]:

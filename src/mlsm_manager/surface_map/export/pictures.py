@@ -4,7 +4,7 @@ import os
 from enum import Enum
 from io import BytesIO
 from pathlib import Path
-from typing import Optional, Tuple
+from typing import Callable, Dict, Optional, Tuple
 
 import numpy as np
 
@@ -43,10 +43,12 @@ class ColorBy(Enum):
     COUNT = "COUNT"
 
 
-_MEANINGS = {
-    ColorBy.HEIGHT: "highest point [m]", ColorBy.STRENGTH: "strength", ColorBy.AGE: "beams since it was heard",
-    ColorBy.COUNT: "points",
-}  # fmt: skip
+_VALUES: Dict[ColorBy, Tuple[str, Callable[[Blocks], np.ndarray]]] = {
+    ColorBy.HEIGHT: ("highest point [m]", lambda blocks: blocks.height),
+    ColorBy.STRENGTH: ("strength", lambda blocks: blocks.mean[:, 3]),
+    ColorBy.AGE: ("beams since it was heard", lambda blocks: blocks.crossed),
+    ColorBy.COUNT: ("points", lambda blocks: blocks.count),
+}
 
 
 def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -> np.ndarray:
@@ -57,22 +59,15 @@ def block_colors(blocks: Blocks, by: ColorBy, limits: Optional[Limits] = None) -
     if by is ColorBy.TYPE:
         return np.array(list(TYPE_COLORS.values()))[blocks.type]
     low, high = limits or color_limits(blocks, by)
-    return ramp((_values(blocks, by) - low) / (high - low) if high > low else np.zeros(len(blocks)))
+    return ramp((_VALUES[by][1](blocks) - low) / (high - low) if high > low else np.zeros(len(blocks)))
 
 
 def color_limits(blocks: Blocks, by: ColorBy) -> Limits:
     """Return the values between which nearly all of the blocks lie; 0 and 0 without blocks, or for types."""
     if by is ColorBy.TYPE or not len(blocks):
         return 0.0, 0.0
-    low, high = np.percentile(_values(blocks, by), _INNER_SHARE)
+    low, high = np.percentile(_VALUES[by][1](blocks), _INNER_SHARE)
     return float(low), float(high)
-
-
-def _values(blocks: Blocks, by: ColorBy) -> np.ndarray:
-    return {
-        ColorBy.HEIGHT: blocks.height, ColorBy.STRENGTH: blocks.mean[:, 3], ColorBy.AGE: blocks.crossed,
-        ColorBy.COUNT: blocks.count,
-    }[by]  # fmt: skip
 
 
 def ramp(shares: np.ndarray) -> np.ndarray:
@@ -107,7 +102,7 @@ def write_picture(path: Path, blocks: Blocks, free: Blocks, color_by: ColorBy) -
         colors = LinearSegmentedColormap.from_list("turbo", _RAMP)
         shown = ScalarMappable(Normalize(*color_limits(blocks, color_by)), colors)
         shown.set_array(np.empty(0))
-        figure.colorbar(shown, ax=axes, label=_MEANINGS[color_by], shrink=0.6)
+        figure.colorbar(shown, ax=axes, label=_VALUES[color_by][0], shrink=0.6)
     picture = BytesIO()
     figure.savefig(picture, format="png", bbox_inches="tight")
     write_whole(path, picture.getvalue())
