@@ -2,9 +2,8 @@
 
 import struct
 from collections import defaultdict
-from contextlib import contextmanager
 from io import BytesIO
-from typing import BinaryIO, Dict, Iterator, List, Optional
+from typing import Dict, List, Optional
 
 from rosbags.interfaces import Connection
 from rosbags.rosbag1.reader import Header, IndexData, Reader, ReaderError, RecordType, read_uint32
@@ -76,8 +75,9 @@ class Ros1Reader(Reader):
         """Add the connections that the chunk at `position` declares to those known."""
         chunk = self.chunks[position]
         self.bio.seek(chunk.datapos)
-        content = BytesIO(chunk.decompressor(self.bio.read(chunk.datasize)))
-        with self._reading(content):
+        # The library reads records of whatever `bio` is.
+        file, self.bio = self.bio, BytesIO(chunk.decompressor(self.bio.read(chunk.datasize)))
+        try:
             while True:
                 kind = self._next_type()
                 if kind is None:
@@ -86,14 +86,7 @@ class Ros1Reader(Reader):
                     one = self.read_connection()
                     self.connections.append(Connection(*one[:5], len(self.indexes.get(one.id, ())), *one[6:]))
                 else:
-                    Header.read(content)
-                    content.seek(read_uint32(content), 1)
-
-    @contextmanager
-    def _reading(self, content: BinaryIO) -> Iterator[None]:
-        """Read records of `content` instead of those of the file."""
-        file, self.bio = self.bio, content
-        try:
-            yield
+                    Header.read(self.bio)
+                    self.bio.seek(read_uint32(self.bio), 1)
         finally:
             self.bio = file

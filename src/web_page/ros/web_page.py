@@ -55,7 +55,12 @@ class WebPage:
         self._asked = rospy.Publisher(topics.SET_MARK, Marker, queue_size=_MARKS_QUEUE)
         self._subscribe()
         try:
-            served = Served(self.board, self._chart, self._ask, lambda one: self.health.problem(one.kind, str(one)))
+            served = Served(
+                self.board,
+                chart=lambda: marks_geojson(self._marks, self._origin),
+                ask=self._ask,
+                refuse=lambda refused: self.health.problem(refused.kind, str(refused)),
+            )
             server = PageServer(served, parameters, package_folder() / "web")
         except OSError as error:
             at = f"{parameters.host}:{parameters.port}"
@@ -74,9 +79,6 @@ class WebPage:
             ("/diagnostics", DiagnosticArray, self._take_diagnostics, {}),
         ):
             rospy.Subscriber(topic, kind, guarded(self.health, take), queue_size=_MARKS_QUEUE, **options)
-
-    def _chart(self) -> bytes:
-        return marks_geojson(self._marks, self._origin)
 
     def _ask(self, request: MarkRequest) -> None:
         """Ask mlsm_core to set or delete a mark; what it answers on MLSM/marks is what pages show."""
