@@ -149,20 +149,26 @@ GHOST = np.array([[2.1, 5.1]])
 """An echo between the vehicle and the harbour's wall that is heard once."""
 
 
-def localiser_of(estimator, **changes):
-    parameters = MlsmCoreParameters(estimator=estimator, map_input=MapInput.MATCHED, **changes)
-    return parameters.build_localiser(SONAR_IN_BASE)
+CARVED_SOON = {"crossings_least": 2, "crossings_per_point": 1.0, "free_scans": 2}
+
+
+def localiser_of(estimator, map_input=MapInput.MATCHED, sonar_in_base=SONAR_IN_BASE, **changes):
+    parameters = MlsmCoreParameters(estimator=estimator, map_input=map_input, **changes)
+    return parameters.build_localiser(sonar_in_base)
+
+
+def heard(turn):
+    """Return a scan of the harbour, the first with the ghost."""
+    return scan_of(np.vstack([harbour(), GHOST]) if turn == 0 else harbour(), still(), start=16.0 * turn)
 
 
 @lru_cache(maxsize=None)
 def layers_with_a_ghost(estimator, matching, carve):
     """Return the maps after a scan with the ghost and eight without it."""
-    changes = {"crossings_least": 2, "crossings_per_point": 1.0, "free_scans": 2}
-    localiser = localiser_of(estimator, start_matching=matching, carve=carve, **changes)
+    localiser = localiser_of(estimator, start_matching=matching, carve=carve, **CARVED_SOON)
     localiser.mount(np.zeros(2))
     for turn in range(9):
-        places = np.vstack([harbour(), GHOST]) if turn == 0 else harbour()
-        localiser.take_scan(scan_of(places, still(), start=16.0 * turn))
+        localiser.take_scan(heard(turn))
     return localiser.estimator.layers
 
 
@@ -230,16 +236,12 @@ def shown_in_order(estimator, cloud_first, carve, scans=9):
 
     scans: how many of the scans come at all.
     """
-    parameters = MlsmCoreParameters(
-        estimator=estimator, start_matching=False, map_input=MapInput.CLEANED, carve=carve,
-        crossings_least=2, crossings_per_point=1.0, free_scans=2,
-    )  # fmt: skip
-    localiser = parameters.build_localiser((0.0, 0.0))
+    changes = {"start_matching": False, "carve": carve, **CARVED_SOON}
+    localiser = localiser_of(estimator, MapInput.CLEANED, (0.0, 0.0), **changes)
     for turn in range(9):
-        heard = scan_of(np.vstack([harbour(), GHOST]) if turn == 0 else harbour(), still(), start=16.0 * turn)
-        steps = [lambda heard=heard: localiser.take_cloud(MapCloud.of_scan(heard))]
-        if turn < scans:
-            steps.insert(1 if cloud_first else 0, lambda heard=heard: localiser.take_scan(heard))
-        for step in steps:
-            step()
+        if turn < scans and not cloud_first:
+            localiser.take_scan(heard(turn))
+        localiser.take_cloud(MapCloud.of_scan(heard(turn)))
+        if turn < scans and cloud_first:
+            localiser.take_scan(heard(turn))
     return localiser
