@@ -97,6 +97,13 @@ class SimulatorDemo(unittest.TestCase):
         self.assertLess((self.errors() / np.sqrt(variances)).max(), 4.0)
         self.assertLess(variances.max(), 0.5**2, variances)
 
+    def test_map_to_odom_goes_to_a_correction_without_a_jump_and_with_a_new_stamp_each_time(self) -> None:
+        transforms = [t for message in self.inboxes["/tf"].messages for t in message.transforms]
+        corrections = [t for t in transforms if t.header.frame_id == "map"]
+        x = np.array([t.transform.translation.x for t in corrections])
+        self.assertTrue(np.any(x[: np.argmax(x > 1.0)] > 0.2), x)
+        self.assertEqual(len({t.header.stamp for t in corrections}), len(corrections))
+
     def test_pose_and_path_say_the_same_as_the_odometry_message(self) -> None:
         fixes, poses = self.places("/MLSM/odometry")[:SCANS, 1:], self.places("/MLSM/pose")[:SCANS, 1:]
         np.testing.assert_array_equal(poses, fixes)

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
-"""A tour on the chart, broken five times: mlsm_core goes on, names what happened, and tells how uncertain it is."""
+"""A tour on the chart, broken seven times: mlsm_core goes on, names what happened, and tells how uncertain it is."""
 
 import unittest
+from typing import List
 
 import numpy as np
 import rospy
@@ -15,7 +16,7 @@ from tf2_msgs.msg import TFMessage
 
 from georeferencing.origin import Origin
 from mlsm_manager.localisation.parameters import MlsmCoreParameters
-from node_support.geometry import composed, transformed
+from node_support.geometry import composed, inverse, transformed
 from underwater_map_construction.msg import PositionStatus, StampedIntensityCloud
 
 TURN, STEP, TICK = 16.0, 1.0, 0.1  # s
@@ -33,6 +34,7 @@ class Trust(unittest.TestCase):
     @classmethod
     def setUpClass(cls) -> None:
         cls.seconds, cls.shift, cls.offset = 0.0, 1000.0, np.zeros(3)
+        cls.strangers: List[str] = []
         cls.fixes = Inbox("/MLSM/pose", PoseWithCovarianceStamped).linked()
         cls.now = Inbox("/MLSM/pose_now", PoseWithCovarianceStamped).linked()
         cls.corrections = Inbox("/tf", TFMessage, lambda sent: sent.transforms[0].header.frame_id == "map").linked()
@@ -77,14 +79,25 @@ class Trust(unittest.TestCase):
         self.assert_goes_on()
         self.assert_said("odometry jumped by 30.")
 
-    def test_2_a_clock_that_jumps_leaves_the_vehicle_where_it_is(self) -> None:
+    def test_2_an_odometry_that_starts_again_from_zero_is_followed_and_named(self) -> None:
+        type(self).offset = inverse(truth(self.seconds))
+        self.assert_goes_on()
+        self.assert_said("odometry started again from zero")
+
+    def test_3_a_second_parent_in_tf_is_refused(self) -> None:
+        type(self).strangers = ["elsewhere"]
+        self.assert_goes_on()
+        type(self).strangers = []
+        self.diagnostics.wait_for("mlsm_core", "transforms of a second parent", 1)
+
+    def test_4_a_clock_that_jumps_leaves_the_vehicle_where_it_is(self) -> None:
         """Only a clock jumps where the odometry says the same place just after it."""
         for number, shift in enumerate((HOUR, -HOUR), start=1):
             type(self).shift += shift
             self.stand_until("jumps in time", number)
             self.assert_goes_on()
 
-    def test_3_a_clock_that_stands_while_the_vehicle_goes_on_is_named_and_the_path_goes_on(self) -> None:
+    def test_5_a_clock_that_stands_while_the_vehicle_goes_on_is_named_and_the_path_goes_on(self) -> None:
         """First it goes on from where it stood, then it jumps ahead to the true time."""
         for number, lost in enumerate((12.0, 0.0), start=1):
             for _ in range(12):
@@ -95,7 +108,7 @@ class Trust(unittest.TestCase):
             type(self).shift += 12.0 - lost
             self.assert_goes_on()
 
-    def test_4_a_place_that_somebody_points_at_is_searched(self) -> None:
+    def test_6_a_place_that_somebody_points_at_is_searched(self) -> None:
         """They point .7 m beside it."""
         pose = PoseWithCovarianceStamped()
         pose.header.frame_id = "map"
@@ -107,7 +120,7 @@ class Trust(unittest.TestCase):
         self.status.wait_for(lambda found: found.text.startswith("no position yet"))
         self.assert_goes_on()
 
-    def test_5_a_sonar_that_falls_silent_is_named_while_the_position_grows_uncertain(self) -> None:
+    def test_7_a_sonar_that_falls_silent_is_named_while_the_position_grows_uncertain(self) -> None:
         before = self.now.wait_for()
         for _ in range(round(4.0 * TURN / STEP)):
             self.send_odometry()
@@ -158,7 +171,8 @@ class Trust(unittest.TestCase):
     def send_odometry(cls) -> None:
         """Send clock and odometry, and wait until map -> odom follows."""
         cls.seconds += STEP
-        cls.tf.publish(TFMessage([cls.odometry()]))
+        strangers = [transform(parent, "base_link", cls.stamp()) for parent in cls.strangers]
+        cls.tf.publish(TFMessage([cls.odometry(), *strangers]))
         # Clock and odometry come on two connections: while the first ticks are answered, the odometry arrives, too.
         for seconds in cls.stamp() - STEP * np.array([0.75, 0.5, 0.25, 0.0]):
             cls.clock.publish(Clock(rospy.Time.from_sec(seconds)))

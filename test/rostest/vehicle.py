@@ -3,6 +3,7 @@
 
 import unittest
 
+import rospy
 from graph import Inbox, run
 from sensor_msgs.msg import PointCloud2
 
@@ -15,9 +16,9 @@ class Vehicle(unittest.TestCase):
     def test_a_turn_of_the_head_becomes_map_and_walls(self) -> None:
         blocks, walls = Inbox("/MLSM/cloud", PointCloud2), Inbox("/sonar/scan/line/coefficients", Walls)
         # The first turn may have begun before the head was placed.
-        found = walls.wait_for(lambda message: len(message.walls) == 4)
-        self.assertEqual(found.header.frame_id, "dead_reckoning")
-        self.assertEqual(blocks.wait_for().header.frame_id, "harbour")
+        found = walls.wait_for(lambda message: len(message.walls) >= rospy.get_param("~walls"))
+        self.assertEqual(found.header.frame_id, rospy.get_param("~odom_frame"))
+        self.assertEqual(blocks.wait_for().header.frame_id, rospy.get_param("~map_frame"))
 
 
 if __name__ == "__main__":
