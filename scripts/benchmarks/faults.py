@@ -25,6 +25,7 @@ from benchmarks.harness import WHOLE_MARINA, mapped_as, marina, recorded
 from benchmarks.tours import simulated
 from mlsm_manager.offline.bag_mapping import MappedBag
 from mlsm_manager.offline.recording import Recording, read_recording, track_between
+from mlsm_manager.offline.run_files import position_error
 from mlsm_manager.scan_matching.scan import Track
 from recordings.bags.bag import RecordingError
 from recordings.reader import Request
@@ -144,11 +145,13 @@ def broken_recordings(rows: str, sources: Sequence[str], seconds: float, seed: O
 
 
 def lines(
-    rows: str = ".", sources: Tuple[str, ...] = USUAL, seconds: float = 600.0, seed: Optional[int] = None
+    rows: str = ".", sources: Tuple[str, ...] = USUAL, seconds: float = 600.0, seed: Optional[int] = None,
+    truth: bool = False,
 ) -> Iterator[str]:  # fmt: skip
     """Yield the rows that a regular expression finds in 'SOURCE: FAULT', and at last how many of them are what.
 
-    seconds: of each recording. seed: of other sizes and times than the usual ones.
+    seconds: of each recording. seed: of other sizes and times than the usual ones. truth: tell the refined path's mean
+    distance from the truth as well, which the canal has none of.
     """
     counts: Dict[Judged, int] = Counter()
     unbroken = lru_cache(maxsize=None)(lambda name: mapped_as(source(name, seconds), "--refine"))
@@ -162,8 +165,12 @@ def lines(
             continue
         row = outcome(found, whole, broken.row.right_causes(broken.source.endswith(_COMPASS)))
         counts[row.judged] += 1
+        told = row.judged.value
+        if truth:
+            error = position_error(found.run.times, found.run.best, broken.whole.truth)["mean"]
+            told = f"truth {error:.2f}  {told}"
         yield (
             f"{broken.name:55} {row.live:6.2f} {row.refined:6.2f} most {row.most:6.2f} stated {row.stated:6.2f} "
-            f"covered {100 * row.covered:3.0f} %  {row.judged.value}\n    {row.cause}\n    {row.line}"
+            f"covered {100 * row.covered:3.0f} %  {told}\n    {row.cause}\n    {row.line}"
         )
     yield ", ".join(f"{counts[judged]} {judged.value}" for judged in Judged)

@@ -86,12 +86,17 @@ def line(told: List[Told], whole: List[Told], begin: float) -> str:
 
 
 def lines(
-    rows: str = ".", sources: Tuple[str, ...] = USUAL, seconds: float = 600.0, seed: Optional[int] = None
+    rows: str = ".", sources: Tuple[str, ...] = USUAL, seconds: float = 600.0, seed: Optional[int] = None,
+    odometry: str = "auto",
 ) -> Iterator[str]:  # fmt: skip
-    """Yield the rows that a regular expression finds in 'SOURCE: FAULT'; options as of scripts/bench faults."""
-    unbroken = lru_cache(maxsize=None)(lambda name: told_by(source(name, seconds), OdometryKind.AUTO))
+    """Yield the rows that a regular expression finds in 'SOURCE: FAULT'.
+
+    odometry: as the nodes are told. The other options are those of scripts/bench faults.
+    """
+    kind = OdometryKind(odometry.upper())
+    unbroken = lru_cache(maxsize=None)(lambda name: told_by(source(name, seconds), kind))
     for broken in broken_recordings(rows, sources, seconds, seed):
         whole = unbroken(broken.source)
-        told = told_by(broken.make(broken.whole), OdometryKind.AUTO)
+        told = told_by(broken.make(broken.whole), kind)
         begin = broken.whole.track.times[0] + getattr(broken.make, "keywords", {}).get("at", 0.0)
         yield f"{broken.name:55} {line(told, whole, begin)}"
