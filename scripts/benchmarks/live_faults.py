@@ -66,7 +66,7 @@ def told_by(recording: Recording, kind: OdometryKind) -> List[Told]:
 def is_called_good(localiser: Localiser, place: Optional[PlaceNow], is_provisional: bool = False) -> bool:
     """Return whether live nodes call a position good."""
     doubts = doubts_of(place, localiser.following.causes(), localiser.verdicts(), {}, "")
-    return position_state(place, localiser.is_lost, is_provisional, doubts)[0] is PositionState.GOOD
+    return position_state(place, localiser.is_lost, is_provisional, doubts, "")[0] is PositionState.GOOD
 
 
 def line(told: List[Told], whole: List[Told], begin: float) -> str:

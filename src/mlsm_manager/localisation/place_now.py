@@ -73,11 +73,12 @@ def doubts_of(
 
 
 def position_state(
-    place: Optional[PlaceNow], is_lost: bool, is_provisional: bool, doubts: Sequence[str]
+    place: Optional[PlaceNow], is_lost: bool, is_provisional: bool, doubts: Sequence[str], assumed: str
 ) -> Tuple[PositionState, str]:
     """Return how well the position is known, and that in words.
 
-    place: None before the first fix. doubts: see `doubts_of`.
+    place: None before the first fix. doubts: see `doubts_of`. assumed: on what a good one rests though nobody measured
+    it, if anything.
     """
     if is_lost:
         return PositionState.UNKNOWN, "position lost: it is searched for in the whole map"
@@ -94,7 +95,7 @@ def position_state(
         return PositionState.PROVISIONAL, "position provisional: no two scans agree yet"
     if too_few(place.fixes):
         return PositionState.PROVISIONAL, f"position provisional, {known_to}: {too_few(place.fixes)}"
-    return PositionState.GOOD, f"position good, {known_to}"
+    return PositionState.GOOD, "; ".join(filter(None, [f"position good, {known_to}", assumed]))
 
 
 def _clause(cause: Cause, time: float) -> str:

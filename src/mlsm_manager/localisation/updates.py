@@ -107,7 +107,7 @@ def report_causes(health: Health, causes: Sequence[Cause], assumed: str) -> None
     """Show what is found to be wrong and what the path rests on, and warn of what still is wrong."""
     lines = [cause.text if np.isnan(cause.begin) else f"{cause.text} at {cause.begin:.1f} s" for cause in causes]
     health.show("causes", "; ".join(lines) or "none found")
-    health.show("assumed", assumed)
+    health.show("assumed", assumed or "nothing")
     wrong = [line for line, cause in zip(lines, causes) if not cause.is_mended]
     if wrong:
         health.problem("seconds with a cause to doubt the position", wrong[0])

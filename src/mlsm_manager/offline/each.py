@@ -8,8 +8,8 @@ import signal
 import subprocess
 import sys
 import time
-from collections import Counter
 from concurrent.futures import FIRST_COMPLETED, CancelledError, Future, ThreadPoolExecutor, wait
+from itertools import chain, count
 from pathlib import Path
 from typing import Any, Callable, Dict, Iterable, List, Optional, Sequence, Tuple
 
@@ -180,13 +180,12 @@ def map_each(
 
 
 def _jobs(recordings: Sequence[Path], out: Path) -> List[Tuple[Path, Path]]:
-    """Return each recording with the folder of its map; of equal names the second and further ones get a number."""
-    taken, jobs = Counter(), []
+    """Return each recording with the folder of its map, of its own name; where that is taken, with a number behind."""
+    folders: Dict[str, Path] = {}
     for recording in recordings:
-        name = recording.stem
-        taken[name] += 1
-        jobs.append((recording.absolute(), out.absolute() / (name if taken[name] == 1 else f"{name}_{taken[name]}")))
-    return jobs
+        numbered = (f"{recording.stem}_{number}" for number in count(2))
+        folders[next(name for name in chain([recording.stem], numbered) if name not in folders)] = recording
+    return [(recording.absolute(), out.absolute() / name) for name, recording in folders.items()]
 
 
 def _mapped(recording: Path, folder: Path, options: Sequence[str]) -> Outcome:

@@ -84,12 +84,12 @@ class StatusTeller:
         if place is not None:
             report_place(self._health, place)
         following = self._localiser.following
-        causes = following.causes()
-        report_causes(self._health, causes, following.found.assumed)
+        causes, assumed = following.causes(), following.found.assumed
+        report_causes(self._health, causes, assumed)
         stages = (*self.stages_before, self._health)
         silent = {topic: seconds for stage in stages for topic, seconds in stage.silent().items()}
         doubts = doubts_of(place, causes, self.verdicts, silent, self._odometry.name)
-        state, text = position_state(place, self._localiser.is_lost, self.is_provisional, doubts)
+        state, text = position_state(place, self._localiser.is_lost, self.is_provisional, doubts, assumed)
         self._health.show("position", text)
         self._publish(state, text, place, T_map_base)
 

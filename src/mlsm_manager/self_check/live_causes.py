@@ -34,7 +34,7 @@ from mlsm_manager.self_check.standing import standing_causes
 from node_support.geometry import composed, move_of
 from sonar_processing.beams.beam import Beam
 
-_NOT_LOOKED = "not looked at yet"
+_NOT_JUDGED = "odometry and sonar are not judged"
 _NEWEST = 30  # scans that are compared
 _FEWEST = 6  # scans: fewer pairs do not show how alike pairs of this water are
 _AT_ONCE = 10.0
@@ -67,7 +67,7 @@ class _Newest(NamedTuple):
 class _Found(NamedTuple):
     """What one look finds; see MotionFindings. spread: (2, 2) m^2, what other paths add to the newest place.
 
-    rests_on: what nobody measured, in words.
+    rests_on: what nobody measured, in words; empty where that is nothing.
     """
 
     causes: List[Cause]
@@ -75,7 +75,7 @@ class _Found(NamedTuple):
     assumed: Assumption
     spread: np.ndarray = np.zeros((2, 2))
     by_mounts: float = 0.0
-    rests_on: str = _NOT_LOOKED
+    rests_on: str = _NOT_JUDGED
 
 
 class LiveCauses:
@@ -99,7 +99,7 @@ class LiveCauses:
 
     @property
     def assumed(self) -> str:
-        """What the path rests on though nobody measured it, in words."""
+        """What the path rests on though nobody measured it, in words; empty where that is nothing."""
         return self._last.rests_on
 
     def take(self, scan: Scan, pose: np.ndarray) -> None:
@@ -153,7 +153,7 @@ class LiveCauses:
             motion = _motion_of(run, [*suspected, *shown, *misread], newest, self._last.course)
             spread = motion.spread(run.log.node_times[-1:])[0]
             causes = motion.told_with(of_echoes, of_beams)
-            untold = UNTOLD_ALONE if motion.is_alone and motion.is_told else "nothing"
+            untold = UNTOLD_ALONE if motion.is_alone and motion.is_told else ""
             rests_on = motion.assumed.text or untold
             found = _Found(causes, motion.course, motion.assumed, spread, motion.by_mounts, rests_on)
         stuck = [of_stuck(*one) for one in stuck_headings(newest.track)]

@@ -1,6 +1,6 @@
 """The ROS side of sonar_to_cloud: beams, tf and the velocity in, scans out (thesis 4.5.1, 6.5.2)."""
 
-from typing import Any, Callable, Dict, List, Tuple
+from typing import Any, Callable, Dict, List, Optional, Tuple
 
 import rospy
 from geometry_msgs.msg import Twist, TwistStamped, Vector3
@@ -72,6 +72,7 @@ class SonarToCloud:
         self._moving_state = MovingState()
         self._revolution = RevolutionCollector()
         self._head = HeadWatch()
+        self._turned: Optional[float] = None
         self._live = ReconfigurableParameters(SonarToCloudParameters, namespace, self.health, self._use_parameters)
         self._scans = CloudPublisher(topics.SCANS)
         self._laser_scans = PointsPublisher(topics.LASER_POINTS)
@@ -90,6 +91,13 @@ class SonarToCloud:
 
     def _use_parameters(self, parameters: SonarToCloudParameters) -> None:
         self._assembler = ScanAssembler(parameters)
+        if self._turned not in (None, parameters.sonar_turned):
+            self._revolution.clear()
+            rospy.logwarn(
+                "%s: sonar_turned is %.3f rad now: the map holds scans that were placed otherwise; begin it anew by "
+                "reset_map of mlsm_core", self.health.name, parameters.sonar_turned,
+            )  # fmt: skip
+        self._turned = parameters.sonar_turned
 
     def _forget_scan(self) -> None:
         self._assembler.clear()

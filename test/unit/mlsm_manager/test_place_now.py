@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state, report_place
-from mlsm_manager.self_check.causes import Cause
+from mlsm_manager.self_check.causes import UNTOLD_ALONE, Cause
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health, Level
 
@@ -19,7 +19,7 @@ DOUBT = ["two submaps"]
 
 
 def test_the_first_fixes_are_provisional_and_what_they_leave_open_is_no_problem():
-    states = [position_state(known_to(0.1)._replace(fixes=fixes), False, False, [])[0] for fixes in (6, 7)]
+    states = [position_state(known_to(0.1)._replace(fixes=fixes), False, False, [], "")[0] for fixes in (6, 7)]
     assert states == [PositionState.PROVISIONAL, PositionState.GOOD]
     health = Health("mlsm_core", lambda line: None)
     for fixes, level in ((2, Level.OK), (3, Level.ERROR)):
@@ -41,7 +41,12 @@ def test_the_first_fixes_are_provisional_and_what_they_leave_open_is_no_problem(
     ],
 )
 def test_a_position_is_good_only_where_nothing_speaks_against_it(place, is_lost, is_provisional, doubts, state, told):
-    assert position_state(place, is_lost, is_provisional, doubts) == (state, told)
+    assert position_state(place, is_lost, is_provisional, doubts, "") == (state, told)
+
+
+def test_a_good_position_tells_on_what_it_rests_though_nobody_measured_it():
+    _, told = position_state(known_to(0.08), False, False, [], UNTOLD_ALONE)
+    assert told == f"position good, 0.4 m; {UNTOLD_ALONE}"
 
 
 JUMP = Cause("odometry jumped by 30.0 m", 1e3, 88.0, is_mended=True, metres=0.5)
@@ -67,4 +72,4 @@ def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes,
     place = None if overdue is None else PlaceNow(100.0, 30.0, overdue, np.eye(3), 5)
     doubts = doubts_of(place, causes, verdicts, silent, ODOMETRY)
     assert doubts == said
-    assert all(doubt in position_state(place, False, False, doubts)[1] for doubt in said)
+    assert all(doubt in position_state(place, False, False, doubts, "")[1] for doubt in said)
