@@ -100,7 +100,7 @@ class Calibration:
         )
 
 
-class _BestPath(NamedTuple):
+class BestPath(NamedTuple):
     """A path as well as a run knows it. poses: (m, 3) T_map_base at the times of the replay. solution: of the solver.
 
     times: (k,) s of its nodes, with places (k, 2) [m], covariances (k, 2, 2) [m^2], and deviations (k,) [m] that are
@@ -115,7 +115,7 @@ class _BestPath(NamedTuple):
     expected: np.ndarray
     mounts: float = 0.0
 
-    def to_the_end(self, end: Optional[PlaceNow], newest: np.ndarray) -> "_BestPath":
+    def to_the_end(self, end: Optional[PlaceNow], newest: np.ndarray) -> "BestPath":
         """Return it with its last place too, where fixes ended long before.
 
         end: see Replayed.at_end. newest: (2, 2) m^2, how well the place of the last scan was known.
@@ -154,11 +154,11 @@ class _BestPath(NamedTuple):
         return bool(np.sqrt(max(between.max(initial=0.0) ** 2 - before**2, 0.0)) > LARGEST_DEVIATION)
 
 
-def _live_path(replayed: Replayed) -> _BestPath:
+def _live_path(replayed: Replayed) -> BestPath:
     solver, strafing = replayed.solver, replayed.strafing
     known, expected = _known_live(solver), solver.expected_deviations(solver.estimates)
     known = known if strafing is None else known.or_on(_known_live(strafing))
-    return _BestPath(replayed.corrected, solver.solution, *known, expected)
+    return BestPath(replayed.corrected, solver.solution, *known, expected)
 
 
 def _known_live(solver: LiveSolver) -> KnownPlaces:
@@ -166,7 +166,7 @@ def _known_live(solver: LiveSolver) -> KnownPlaces:
     return KnownPlaces(*(np.array(ones) for ones in zip(*told)))
 
 
-def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
+def _refined_path(refined: Refined, replayed: Replayed) -> BestPath:
     solver, strafing = replayed.solver, replayed.strafing
     known = _known_by(refined.motion.fit, refined.motion.run)
     lengths = np.full(len(known.times), solver.estimates[-1].length_deviation)
@@ -175,7 +175,7 @@ def _refined_path(refined: Refined, replayed: Replayed) -> _BestPath:
     known = known._replace(covariances=known.covariances + refined.motion.spread(known.times))
     # One fit takes a second, a search for the best path minutes. On unbroken tours both state the same within 2 %.
     known = known if strafing is None else known.or_on(_known_by(fit_of(strafing.solution), strafing.solution))
-    return _BestPath(refined.poses, refined.motion.run, *known, expected, refined.motion.mounts)
+    return BestPath(refined.poses, refined.motion.run, *known, expected, refined.motion.mounts)
 
 
 def _known_by(fit: BatchResult, run: Solution) -> KnownPlaces:
@@ -183,7 +183,7 @@ def _known_by(fit: BatchResult, run: Solution) -> KnownPlaces:
     return KnownPlaces(fit.node_times, places, fit.pose_covariances[:, :2, :2])
 
 
-def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> List[Verdict]:
+def _checks(replayed: Replayed, best: BestPath, calibration: Calibration) -> List[Verdict]:
     solver = replayed.solver
     parts, apart = solver.parameters.parts_per_turn, solver.submaps.apart
     turns = Turns.of(solver.estimates, apart, parts)
@@ -211,7 +211,7 @@ def _checks(replayed: Replayed, best: _BestPath, calibration: Calibration) -> Li
 
 
 def _trust(
-    replayed: Replayed, best: _BestPath, verdicts: List[Verdict], causes: Sequence[Cause], assumed: Assumption
+    replayed: Replayed, best: BestPath, verdicts: List[Verdict], causes: Sequence[Cause], assumed: Assumption
 ) -> Trust:
     """Return how far a path can be trusted, with what causes add to what is stated."""
     reported = Track(replayed.times, replayed.odometry).at(best.times)[:, :2]

@@ -30,7 +30,7 @@ pytestmark = pytest.mark.long
 
 WHOLE, LIMITS, MIDDLE = touring(), MotionLimits(), SECONDS / 2.0
 START, ASIDE = WHOLE.track.times[0], strafing()
-SHORT = {"ahead": shortened(WHOLE, 200.0), "aside": shortened(ASIDE, 200.0)}
+SHORT = {"ahead": shortened(WHOLE, 140.0), "aside": shortened(ASIDE, 140.0)}
 
 
 def found_in(recording):

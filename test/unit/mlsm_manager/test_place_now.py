@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from mlsm_manager.localisation.place_now import PlaceNow, PositionState, doubts_of, position_state, report_place
+from mlsm_manager.offline.findings import BestPath
 from mlsm_manager.self_check.causes import UNTOLD_ALONE, Cause
 from mlsm_manager.self_check.verdict import Verdict
 from node_support.health import Health, Level
@@ -73,3 +74,12 @@ def test_what_speaks_against_a_position_is_said_the_worst_first(overdue, causes,
     doubts = doubts_of(place, causes, verdicts, silent, ODOMETRY)
     assert doubts == said
     assert all(doubt in position_state(place, False, False, doubts, "")[1] for doubt in said)
+
+
+def test_where_fixes_ended_the_last_place_is_known_no_better_than_that_of_the_last_scan():
+    nowhere = np.zeros((1, 2))
+    path = BestPath(np.zeros((2, 3)), None, np.array([90.0]), nowhere, 4.0 * np.eye(2)[np.newaxis], np.zeros(1))
+    end = known_to(1.0)._replace(covariance=np.diag([1.0, 9.0, 1.0]))
+    ended = path.to_the_end(end, np.diag([2.0, 4.0]))
+    np.testing.assert_allclose(ended.covariances, [np.diag([4.0, 4.0]), np.diag([4.0, 9.0])])
+    assert ended.times.tolist() == [90.0, 100.0]

@@ -15,6 +15,7 @@ from mlsm_manager.self_check.beam_causes import ranges_are_told
 
 WHOLE, MIDDLE = shortened(touring(), 200.0), 100.0
 COMPASS = WHOLE.without_positions()
+SHORTEST = shortened(COMPASS, 120.0)
 ARM = SonarFault(SonarKind.ARM, np.nan, (2.0, 1.0))
 TILT = SonarFault(SonarKind.TILT, np.nan, (0.1, 0.0))
 RANGES = SonarFault(SonarKind.RANGES, 1.5, (np.log(2.0),))
@@ -65,8 +66,8 @@ def test_no_change_of_ranges_is_tried_that_no_setting_makes(size, tried):
         (broken.mount_shifted(WHOLE, 2.0), "the sonar sits +", ()),
         (mount_tilted(WHOLE, 25.0), "the sonar's plane is tilted by about 2", ()),
         (broken.range_changed(WHOLE, MIDDLE, 1.5), "the range setting changed untold: reported ranges are 0.6", ()),
-        (broken.range_changed(COMPASS, MIDDLE, 1.5), "the range setting changed untold: reported ranges", NAMED),
-        (broken.range_changed(COMPASS, MIDDLE, 1.15), "the range setting changed untold: reported ranges", NAMED),
+        (broken.range_changed(SHORTEST, 60.0, 1.5), "the range setting changed untold: reported ranges", NAMED),
+        (broken.range_changed(SHORTEST, 60.0, 1.15), "the range setting changed untold: reported ranges", NAMED),
         (broken.mount_upside_down(COMPASS), "the sonar is upside down, or its head turns", NAMED),
     ],
     ids=["arm", "tilt", "ranges", "ranges by compass", "a little by compass", "over by compass"],
@@ -89,7 +90,7 @@ def test_a_change_of_ranges_is_named_beside_a_compass_where_the_vehicle_passes_n
 
 @pytest.mark.long
 def test_a_change_of_ranges_is_named_beside_a_compass_where_the_path_went_on_by_the_map():
-    recording = broken.range_changed(source("harbour compass", 400.0), 182.0, 0.581)
+    recording = broken.range_changed(shortened(source("harbour compass", 400.0), 200.0, 80.0), 102.0, 0.581)
     (cause,) = mapped_as(recording, "--refine", *NAMED).findings.trust.causes
     assert cause.text.startswith("the range setting changed untold: reported ranges are 1.7")
 
@@ -102,10 +103,10 @@ def test_no_change_of_ranges_is_named_untold_where_messages_tell_them():
 
 @pytest.mark.long
 def test_a_time_without_echoes_is_named_in_which_the_position_is_lost():
-    recording = broken.beams_stop(source("harbour compass", 400.0), 128.0, 92.0)
+    recording = broken.beams_stop(shortened(source("harbour compass", 400.0), 260.0, 20.0), 108.0, 92.0)
     cause = mapped_as(recording, "--refine").findings.trust.causes[-1]
     assert cause.text.startswith("no echo came for 1")
-    assert cause.begin == pytest.approx(recording.track.times[0] + 128.0, abs=10.0)
+    assert cause.begin == pytest.approx(recording.track.times[0] + 108.0, abs=10.0)
 
 
 @pytest.mark.long
@@ -125,7 +126,7 @@ def test_where_beams_stop_the_position_is_less_and_less_known_and_the_time_is_na
         shortened(broken.mount_upside_down(COMPASS), 100.0),
         shortened(broken.range_changed(COMPASS, 50.0, 1.5), 100.0),
         broken.range_changed(COMPASS, MIDDLE, 0.5),
-        broken.range_changed(source("harbour compass", 400.0), 229.0, 0.511),
+        broken.range_changed(shortened(source("harbour compass", 400.0), 240.0, 160.0), 69.0, 0.511),
     ],
     ids=["over", "longer ranges", "shorter ranges", "shorter ranges near a wall"],
 )
