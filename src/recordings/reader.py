@@ -27,14 +27,14 @@ from recordings.motion.vehicle_motion import (
     unsaid_motion,
 )
 from recordings.ping_viewer_next import vehicle_headings
-from sonar_processing.beams.parameters import MountingParameters
+from sonar_processing.beams.parameters import SonarPoseParameters
 from sonar_processing.beams.reader import BeamMessageParameters
 
 _Result = TypeVar("_Result")
 
 
 @dataclass(frozen=True)
-class ReadingParameters(MountingParameters, BeamMessageParameters):
+class ReadingParameters(SonarPoseParameters, BeamMessageParameters):
     """Where the sonar is mounted, and how the angles in its messages are understood."""
 
 
@@ -97,7 +97,7 @@ def bag_of_beams(path: Path) -> Bag:
 
 
 def mounted(
-    tree: FrameTree, base_frame: str, recorded: RecordedBeams, parameters: MountingParameters
+    tree: FrameTree, base_frame: str, recorded: RecordedBeams, parameters: SonarPoseParameters
 ) -> Tuple[FrameTree, List[str]]:
     """Return a tree in which every frame of beams is linked to the vehicle, and what was assumed for that."""
     notes, mount = [], parameters

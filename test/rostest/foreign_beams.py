@@ -90,7 +90,7 @@ class ForeignBeams(unittest.TestCase):
         before = self.heard_at()
         self.assertEqual(client.update_configuration({"sonar_turned": 0.5})["sonar_turned"], 0.5)
         self.assertAlmostEqual((self.heard_at() - before + np.pi) % (2.0 * np.pi) - np.pi, 0.5, places=2)
-        self.wait_for_log("begin it anew by reset_map")
+        self.wait_for_log("mlsm_core to begin it anew")
 
     def heard_at(self) -> float:
         """Publish a beam, and return where it hears the wall: rad, from the sonar, in odom."""

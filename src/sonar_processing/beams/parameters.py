@@ -21,7 +21,7 @@ def beam_width_parameter(text: str = "horizontal width of the beam") -> Any:
 
 
 @dataclass(frozen=True)
-class MountingParameters(ParameterSet):
+class SonarPoseParameters(ParameterSet):
     """The sonar's pose in a frame of the vehicle, used where tf does not know the frame of the beams."""
 
     mounted_in: str = parameter(

@@ -94,8 +94,8 @@ class SonarToCloud:
         if self._turned not in (None, parameters.sonar_turned):
             self._revolution.clear()
             rospy.logwarn(
-                "%s: sonar_turned is %.3f rad now: the map holds scans that were placed otherwise; begin it anew by "
-                "reset_map of mlsm_core", self.health.name, parameters.sonar_turned,
+                "%s: sonar_turned is %.3f rad now: the map holds scans that were placed otherwise; call reset_map of "
+                "mlsm_core to begin it anew", self.health.name, parameters.sonar_turned,
             )  # fmt: skip
         self._turned = parameters.sonar_turned
 

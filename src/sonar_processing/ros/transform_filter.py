@@ -19,7 +19,7 @@ from node_support.ros.callbacks import guarded, on_change
 from node_support.ros.transforms import TfBuffer, pose_from_matrix
 from sonar_processing.beams.beam import Beam, PlacedBeam
 from sonar_processing.beams.beam_queue import BeamQueue, WaitingBeam
-from sonar_processing.beams.parameters import MountingParameters
+from sonar_processing.beams.parameters import SonarPoseParameters
 
 _PATIENCE = 0.5  # s: whoever knows the frame and has started sends it at once, because /tf_static is latched
 _FEWEST = 10  # Beams of one frame that wait: a few may be broken messages
@@ -29,7 +29,7 @@ _CACHE = 180.0  # s that tf remembers: longer than the beams that wait, also whi
 class SonarMount:
     """Fixes the frame of the beams to the vehicle as the parameters say; once, and only a frame that tf lacks."""
 
-    def __init__(self, parameters: MountingParameters, name: str) -> None:
+    def __init__(self, parameters: SonarPoseParameters, name: str) -> None:
         """`name`: of the node, for its log."""
         self._parameters = parameters
         self._name = name

@@ -7,7 +7,7 @@ from enum import Enum
 from node_support import topics
 from node_support.headers import StampParameters
 from node_support.parameters import ParameterSet, parameter
-from sonar_processing.beams.parameters import BeamCorrection, MountingParameters, beam_width_parameter
+from sonar_processing.beams.parameters import BeamCorrection, SonarPoseParameters, beam_width_parameter
 from sonar_processing.beams.reader import BeamMessageParameters
 
 
@@ -92,7 +92,7 @@ class ScanParameters(ParameterSet):
 
 @dataclass(frozen=True)
 class SonarToCloudParameters(
-    MountingParameters, BeamMessageParameters, BeamCorrection, ScanParameters, StampParameters
+    SonarPoseParameters, BeamMessageParameters, BeamCorrection, ScanParameters, StampParameters
 ):
     sonar_turned: float = parameter(
         0.0, "how far the sonar is turned against tf, counter-clockwise seen from above, as mlsm_core names it",

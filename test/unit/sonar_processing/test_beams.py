@@ -14,7 +14,7 @@ from node_support.errors import RefusedInput
 from node_support.geometry import pose_matrix
 from node_support.parameters import ParameterError
 from sonar_processing.beams.beam import Beam, PlacedBeam, beam_directions, project_beams
-from sonar_processing.beams.parameters import BeamCorrection, MountingParameters
+from sonar_processing.beams.parameters import BeamCorrection, SonarPoseParameters
 from sonar_processing.cloud import Cloud
 
 ANGLES = st.floats(-7.0, 7.0)
@@ -119,13 +119,13 @@ def test_dispersed_points_spread_evenly_across_the_beams_width_and_keep_range_an
     ],
 )
 def test_angle_0_points_along_mount_yaw_and_an_upside_down_head_turns_the_other_way(angle, mounting, expected):
-    first_bin = _projected(beam_of(angle=angle), MountingParameters(**mounting).matrix())[0, :3]
+    first_bin = _projected(beam_of(angle=angle), SonarPoseParameters(**mounting).matrix())[0, :3]
     np.testing.assert_allclose(first_bin, expected, atol=1e-6)
 
 
 def test_a_mounting_out_of_range_is_refused():
     with pytest.raises(ParameterError, match="mount_x"):
-        MountingParameters(mount_x=1000.0)
+        SonarPoseParameters(mount_x=1000.0)
 
 
 def test_the_delay_is_added_to_the_nanosecond():
