@@ -24,7 +24,7 @@ from node_support.geometry import move_of
 TWICE_ROUND = touring()
 WHOLE, MIDDLE = shortened(TWICE_ROUND, 200.0), 100.0
 START = WHOLE.track.times[0]
-ALONE = broken.with_compass_error(WHOLE.without_positions(), 0.2 * trembling(WHOLE))
+ALONE = shortened(broken.with_compass_error(WHOLE.without_positions(), 0.2 * trembling(WHOLE)), 140.0)
 HARBOUR, LONGER, TURNING = ("harbour", 300.0), ("harbour", 400.0), ("turning", 300.0)  # of `source`
 NODES = np.arange(START, TWICE_ROUND.track.times[-1], 10.0)
 
@@ -154,8 +154,8 @@ def test_a_fault_is_named_first_and_the_path_fitted_without_it(tour, fault, said
 @pytest.mark.parametrize(
     ("recording", "said"),
     [
-        (broken.odometry_freezes(ALONE, MIDDLE, 40.0), "the compass stuck for 40 s and missed "),
-        (broken.head_slips(WHOLE.without_positions(), MIDDLE, 25.0), "the head slipped by 2"),
+        (broken.odometry_freezes(ALONE, 70.0, 40.0), "the compass stuck for 40 s and missed "),
+        (broken.head_slips(ALONE, 70.0, 25.0), "the head slipped by 2"),
     ],
     ids=["compass stuck", "head slipped"],
 )
