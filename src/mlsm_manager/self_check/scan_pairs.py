@@ -50,13 +50,6 @@ class Hypothesis:
 AS_TOLD = Hypothesis()
 
 
-class _Heard(NamedTuple):
-    """points: (n, 2) m from the sonar, along base_link's axes, each at its own beam, of `times` (n,) s."""
-
-    points: np.ndarray
-    times: np.ndarray
-
-
 class ScanPairs:
     """Pairs of scans, and how far they lie apart under a hypothesis.
 
@@ -69,17 +62,21 @@ class ScanPairs:
     ) -> None:  # fmt: skip
         """sonar_in_base: (2,) m, by tf. corrections: T_map_odom as the solver found it; None where none did yet."""
         self._sonar, self._corrections = sonar_in_base, corrections
-        self._heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
+        heard = [_heard(scan, sonar_in_base) for scan in scans if len(scan) >= FEWEST]
+        # Of all scans, from the sonar, along base_link's axes, each at its own beam.
+        self._points = np.concatenate([points for points, _ in heard] or [np.empty((0, 2))])
+        self._times = np.concatenate([times for _, times in heard] or [np.empty(0)])
+        self._ends = np.cumsum([len(times) for _, times in heard], dtype=int)
         self._reported = joined([scan.track for scan in scans]) if scans else None
         self._tracks: Dict[Mirror, Track] = {}
         self._pairs = self._chosen()
-        self.begins = np.array([one.times[0] for one in self._heard])
-        self.middles = np.array([one.times.mean() for one in self._heard])
-        ends = [[self.begins[one], self._heard[other].times[-1]] for one, other in self._pairs]
+        self.begins = np.array([times[0] for _, times in heard])
+        self.middles = np.array([times.mean() for _, times in heard])
+        ends = [[self.begins[one], self._times[self._ends[other] - 1]] for one, other in self._pairs]
         self.times = np.array(ends).reshape(-1, 2)
         self.scans = len(np.unique(self.times[:, 0]))
         self._known: Dict[Hypothesis, np.ndarray] = {}
-        self._ways: Dict[Tuple[int, Hypothesis], np.ndarray] = {}
+        self._ways: Dict[Hypothesis, np.ndarray] = {}
 
     @property
     def tell(self) -> bool:
@@ -88,7 +85,7 @@ class ScanPairs:
     def _chosen(self) -> List[Tuple[int, int]]:
         """Return pairs of numbers between which the vehicle moved by the odometry, in the order of time."""
         found = []
-        ends = [self._reported.at(one.times[-1]) for one in self._heard]
+        ends = [self._reported.at(self._times[end - 1]) for end in self._ends]
         for number in range(len(ends)):
             for apart in _APART:
                 if number + apart < len(ends):
@@ -100,32 +97,30 @@ class ScanPairs:
     def distances(self, hypothesis: Hypothesis) -> np.ndarray:
         """Return how far (p,) [m] the scans of each pair lie apart."""
         if hypothesis not in self._known:
-            needed = {number for pair in self._pairs for number in pair}
-            placed = {number: self._placed(number, hypothesis) for number in needed}
+            placed = self._placed(hypothesis)
             targets = {number: along_x(placed[number]) for number in {first for first, _ in self._pairs}}
             self._known[hypothesis] = np.array([_apart(targets[one], placed[other]) for one, other in self._pairs])
         return self._known[hypothesis]
 
-    def _placed(self, number: int, hypothesis: Hypothesis, ranges: float = 1.0) -> np.ndarray:
-        """Return where echoes (n, 2) [m] of a scan are, with `ranges` times their distances from the sonar."""
+    def _placed(self, hypothesis: Hypothesis, ranges: float = 1.0) -> List[np.ndarray]:
+        """Return where echoes (n, 2) [m] of each scan are, with `ranges` times their distances from the sonar."""
         signs = np.array([1.0, -1.0 if hypothesis.is_over else 1.0])
-        points, times = self._heard[number]
-        mounts = np.tile([*self._sonar, hypothesis.turn], (len(times), 1))
+        mounts = np.tile([*self._sonar, hypothesis.turn], (len(self._times), 1))
         mounts += np.array([hypothesis.ahead, hypothesis.aside, 0.0])
-        mounts[:, 2] += hypothesis.slips * (times - self._heard[0].times[0])
-        in_base = transformed(mounts, ranges * signs * points)
-        return transformed(self._poses(number, hypothesis), in_base)
+        mounts[:, 2] += hypothesis.slips * (self._times - self._times[:1])
+        in_base = transformed(mounts, ranges * signs * self._points)
+        return np.split(transformed(self._poses(hypothesis), in_base), self._ends)[:-1]
 
-    def _poses(self, number: int, hypothesis: Hypothesis) -> np.ndarray:
-        """Return where the vehicle was at each echo (n, 3) of a scan; mounts change nothing of it."""
+    def _poses(self, hypothesis: Hypothesis) -> np.ndarray:
+        """Return where the vehicle was at each echo (n, 3) of all scans; mounts change nothing of it."""
         went = replace(hypothesis, turn=0.0, is_over=False, ahead=0.0, aside=0.0, slips=0.0)
-        if (number, went) not in self._ways:
+        if went not in self._ways:
             if went.mirrored not in self._tracks:
                 self._tracks[went.mirrored] = went.mirrored.of(self._reported)
-            times = self._heard[number].times + went.delay
+            times = self._times + went.delay
             poses = self._tracks[went.mirrored].at(times) * [went.scale, went.scale, 1.0]
-            self._ways[number, went] = composed(self._corrections.at(times), poses) if went.as_solved else poses
-        return self._ways[number, went]
+            self._ways[went] = composed(self._corrections.at(times), poses) if went.as_solved else poses
+        return self._ways[went]
 
     def best(self, tried: Iterable[Hypothesis]) -> Hypothesis:
         return min(tried, key=lambda one: float(self.distances(one).mean()))
@@ -148,46 +143,37 @@ class ScanPairs:
 
     def near(self, base: Hypothesis) -> Tuple[np.ndarray, np.ndarray]:
         """Return what `near_pairs` does for all scans as they lie if `base` is right."""
-        return near_pairs([self._placed(number, base) for number in range(len(self._heard))])
-
-    def _table(self, pairs: np.ndarray, base: Hypothesis, moved: Callable[[int, int], List[np.ndarray]]) -> np.ndarray:
-        """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart with the later one at each of the places that
-        `moved` returns for their numbers.
-        """
-        columns = []
-        for one, other in pairs:
-            earlier = along_x(self._placed(one, base))
-            columns.append([_apart(earlier, places) for places in moved(one, other)])
-        return np.array(columns).T.copy()
+        return near_pairs(self._placed(base))
 
     def carried(self, pairs: np.ndarray, velocities: np.ndarray, base: Hypothesis) -> np.ndarray:
         """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the vehicle went by `velocities` (k, 2) [m/s]
         faster than it does if `base` is right.
         """
+        placed = self._placed(base)
 
         def moved(one: int, other: int) -> List[np.ndarray]:
-            later, seconds = self._placed(other, base), self.middles[other] - self.middles[one]
-            return [later + move for move in velocities * seconds]
+            return [placed[other] + move for move in velocities * (self.middles[other] - self.middles[one])]
 
-        return self._table(pairs, base, moved)
+        return _table(pairs, placed, moved)
 
     def changed(self, pairs: np.ndarray, changes: Sequence["Change"], base: Hypothesis) -> np.ndarray:
         """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart if the later one has each of `changes` (k)."""
+        placed = {ranges: self._placed(base, ranges) for ranges in {1.0, *(one.ranges for one in changes)}}
 
         def moved(_: int, other: int) -> List[np.ndarray]:
-            centre = self._poses(other, base)[-1, :2]
-            late = {ranges: self._placed(other, base, ranges) - centre for ranges in {one.ranges for one in changes}}
+            centre = self._poses(base)[self._ends[other] - 1, :2]
+            late = {ranges: scans[other] - centre for ranges, scans in placed.items()}
             return [rotated(late[one.ranges], np.full(len(late[one.ranges]), one.turn)) + centre for one in changes]
 
-        return self._table(pairs, base, moved)
+        return _table(pairs, placed[1.0], moved)
 
     def facing(self, numbers: Iterable[int], base: Hypothesis) -> np.ndarray:
         """Return the mean outer product (2, 2) of the normals of surfaces that some scans heard if `base` is right.
 
         Each normal is weighted by how certain it is.
         """
-        placed = [self._placed(number, base) for number in numbers]
-        told = [surface_normals(places, np.full(len(places), LEAST_REACH)) for places in placed]
+        placed = self._placed(base)
+        told = [surface_normals(placed[number], np.full(len(placed[number]), LEAST_REACH)) for number in numbers]
         normals, qualities = map(np.concatenate, zip(*told))
         return np.einsum("n,na,nb->ab", qualities, normals, normals) / max(qualities.sum(), _NOTHING)
 
@@ -199,7 +185,7 @@ class ScanPairs:
 
     def typical_range(self) -> float:
         """Return the median range of echoes, m."""
-        return float(np.median(np.concatenate([np.hypot(*one.points.T) for one in self._heard])))
+        return float(np.median(np.hypot(*self._points.T)))
 
 
 class Change(NamedTuple):
@@ -234,11 +220,25 @@ def evidence_of(apart: np.ndarray, closer: np.ndarray, scans: int, alike: Option
     return scans * told * float(np.log((apart.mean() + _NOISE) / (closer.mean() + _NOISE)))
 
 
-def _heard(scan: Scan, sonar_in_base: np.ndarray) -> _Heard:
+def _table(
+    pairs: np.ndarray, placed: Sequence[np.ndarray], moved: Callable[[int, int], List[np.ndarray]]
+) -> np.ndarray:  # fmt: skip
+    """Return how far (k, p) [m] scans of `pairs` (p, 2) lie apart with the later one at each of the places that
+    `moved` returns for their numbers; placed: (n, 2) m, of each scan.
+    """
+    columns = []
+    for one, other in pairs:
+        earlier = along_x(placed[one])
+        columns.append([_apart(earlier, places) for places in moved(one, other)])
+    return np.array(columns).T.copy()
+
+
+def _heard(scan: Scan, sonar_in_base: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
+    """Return where echoes (n, 2) [m] of a scan are from the sonar, along base_link's axes, and their times (n,) [s]."""
     chosen = slice(None, None, -(-len(scan) // MOST))
     order = np.argsort(scan.times[chosen], kind="stable")
     times, points = scan.times[chosen][order], scan.points[chosen, :2][order]
-    return _Heard(transformed(inverse(scan.track.at(times)), points) - sonar_in_base, times)
+    return transformed(inverse(scan.track.at(times)), points) - sonar_in_base, times
 
 
 def around(base: Hypothesis, name: str, values: Iterable[float]) -> List[Hypothesis]:
