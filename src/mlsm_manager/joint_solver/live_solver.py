@@ -23,6 +23,7 @@ from node_support.errors import RefusedInput
 ODOMETRY = "odometry"  # under which the name of a run's model is stored
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
+_FREE_ANEW = 10  # scans: a fit of the whole run comes after
 _FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
 
 
@@ -281,6 +282,20 @@ class LiveSolver:
             starts_known = self._known is not None or self._start is not None
             placed = self._by_parts.placed(self.log, self.state.nodes, self.parameters, starts_known)
             self.state.nodes[-len(placed) :] = placed
+
+
+def followed_anew(run: Solution, first: int) -> State:
+    """Return the unknowns of a run whose scans from `first` on are followed anew, as if it had begun with them.
+
+    Raises RefusedInput where a fit has no finite solution.
+    """
+    solver, parameters = None, replace(run.parameters, free_scans=_FREE_ANEW)
+    for log in run.log.since(first).grown():
+        solver = solver or LiveSolver(parameters, log)
+        solver.solve()
+    nodes = solver.state.nodes
+    nodes[:, :YAW] += run.state.nodes[first, :YAW] - nodes[0, :YAW]
+    return State(np.append(run.state.nodes[:first], nodes, axis=0), run.state.run)
 
 
 def name_of(odometry: OdometryModel) -> np.ndarray:

@@ -1,7 +1,7 @@
 """What was measured during a run: surface points of every scan, the nodes' times, the odometry; and its storing."""
 
 from dataclasses import fields, is_dataclass, replace
-from typing import Any, Callable, Dict, List, Mapping, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, Iterator, List, Mapping, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -184,6 +184,19 @@ class RunLog:
         other.sonar_in_base = np.ascontiguousarray(sonar_in_base, dtype=np.float64)
         other.surfaces, other.posts = self.surfaces.since(0, change), self.posts.since(0, change)
         return other
+
+    def grown(self) -> Iterator["RunLog"]:
+        """Yield a log of the same odometry again and again, as it takes one scan of this one after the other."""
+        log = RunLog(self.sonar_in_base)
+        log.odometry = self.odometry
+        log._node_times.extend(self.node_times[:1])
+        for scan in range(self.scan_count):
+            log._node_times.extend(self.node_times[scan + 1 : scan + 2])
+            log._scans.extend(self._scans.values[scan : scan + 1])
+            log.surfaces.append(self.surfaces.heard(scan, scan + 1)[0])
+            log.posts.append(self.posts.heard(scan, scan + 1)[0])
+            log._count()
+            yield log
 
     def node_motion(self, nodes: np.ndarray) -> Motion:
         """Return what the odometry reported up to `nodes` (n,)."""

@@ -2,18 +2,19 @@
 
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import List, Sequence, Tuple
+from typing import List, Optional, Sequence, Tuple
 
 import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, QuickFit, likelihood_of
+from mlsm_manager.joint_solver.live_solver import followed_anew
 from mlsm_manager.joint_solver.normal_equations import YAW, State
 from mlsm_manager.joint_solver.odometry_trials import fit_from, reckoned
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, slants_of
-from mlsm_manager.joint_solver.velocity_models import AHEAD, TRAVEL
 from mlsm_manager.scan_matching.scan import Scan
+from node_support.errors import RefusedInput
 from node_support.geometry import inverse, transformed
 
 _ARM, _TILT, _FACTOR = 0.6, np.radians(14.0), np.log(1.1)  # m, rad, logarithm: less is how mounts and water are
@@ -33,7 +34,7 @@ _SHARE = 0.1  # of a step, in which the likelihood changes evenly
 _FARTHEST = 2.0  # steps: beyond, likelihoods are no parabolas
 _LARGEST = np.log(5.0)  # of settings: more is none
 _CHANGES = 4  # of ranges, that are tried
-_PASSES = 2  # nodes that a change of ranges makes lie wrongly
+_BEFORE = 8  # scans before a change, from which on a run is followed anew: about as many as hear the same
 _FEWEST = 10  # points of a scan that tell how far it hears
 _STEEP = 4.0  # nats a step: with less no fault of the kind makes even a marina, which tells least, three nats likelier
 
@@ -120,43 +121,28 @@ class SonarFault:
         return replace(scan, points=transformed(poses, seen))
 
 
-def fit_without(run: Solution, fault: SonarFault) -> Tuple[Solution, QuickFit]:
+def fit_without(run: Solution, fault: SonarFault, start: Optional[State] = None) -> Tuple[Solution, QuickFit]:
     """Return a run without a fault of its sonar, and its fit.
 
-    After a change of ranges it begins where the odometry leads, or, where that tells no distances, with a path that is
-    as much longer: the path that they made may be far from the true one. It may also be near, where some scans met the
-    map: so it begins from that, too.
+    start: of the fit. Without one it begins, after a change of ranges, where the odometry leads, for the path that they
+    made may be far from the true one. Where the odometry tells no distances it begins where scan after scan leads, and
+    on that path too, which may be near where some scans met the map.
     """
     changed = replace(run, log=fault.logged(run.log))
-    starts = [State(nodes, run.state.run.copy()) for nodes in _starts(run, changed.log, fault)]
-    return changed, fit_from(changed, starts)
+    return changed, fit_from(changed, _starts(run, changed, fault) if start is None else [start])
 
 
-def _starts(run: Solution, log: RunLog, fault: SonarFault) -> List[np.ndarray]:
-    """Return nodes (n, width) at which a fit without a fault may begin."""
+def _starts(run: Solution, changed: Solution, fault: SonarFault) -> List[State]:
+    """Return where a fit of `changed`, the run without a fault, may begin."""
     if fault.kind is not SonarKind.RANGES:
-        return [run.state.nodes.copy()]
+        return [run.state]
     if not np.isinf(run.parameters.odometry.distance_deviation):
-        return [reckoned(run, log, run.state.nodes, (fault.begin, np.inf))]
-    before = int(np.searchsorted(log.node_times, fault.begin)) - 1
-    # The first scan after the change may have moved the node before it: the fit begins from the one before that, too.
-    longer = [_longer(run, log, fault, first) for first in sorted({max(before, 0), max(before - 1, 0)})]
-    return [run.state.nodes.copy(), *longer]
-
-
-def _longer(run: Solution, log: RunLog, fault: SonarFault, first: int) -> np.ndarray:
-    """Return the nodes with all ways and speeds after node `first` as much longer as the true ranges are.
-
-    In the next scans, which did not lie on those before them, the vehicle goes on as before.
-    """
-    nodes, factor = run.state.nodes, np.exp(fault.sizes[0])
-    result = nodes.copy()
-    places = log.node_poses(np.arange(len(nodes)))[:, :YAW] + nodes[:, :YAW]
-    result[first:, :YAW] += (factor - 1.0) * (places[first:] - places[first])
-    result[first:, AHEAD : TRAVEL + 1] *= factor
-    result[first : first + _PASSES, AHEAD : TRAVEL + 1] = nodes[max(first - 1, 0), AHEAD : TRAVEL + 1]
-    begin, last = min(first + 1, len(nodes) - 1), min(first + _PASSES, len(nodes) - 1)
-    return reckoned(run, log, result, (log.node_times[begin], log.node_times[last]))
+        return [State(reckoned(run, changed.log, run.state.nodes, (fault.begin, np.inf)), run.state.run)]
+    before = int(np.searchsorted(changed.log.node_times, fault.begin)) - _BEFORE
+    try:
+        return [run.state, followed_anew(changed, max(before, 0))]
+    except RefusedInput:
+        return [run.state]
 
 
 def likelihood_across(run: Solution, fitted: State, fault: SonarFault) -> float:

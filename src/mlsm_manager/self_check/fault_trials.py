@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from operator import attrgetter
-from typing import List, NamedTuple, Sequence, Tuple
+from typing import List, NamedTuple, Optional, Sequence, Tuple
 
 import numpy as np
 
@@ -175,7 +175,7 @@ def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[
     worth_it = [trial for trial in trials if trial.gain > 0.0 or not isinstance(trial.fault, SonarFault)]
     best = max(worth_it or trials, key=_GAIN)
     for _ in range(_rounds(found, best)):
-        best = max([best, *(_tried(found, fault) for fault in _beside(best.fault))], key=_GAIN)
+        best = max([best, *(_tried(found, fault, best.fit.state) for fault in _beside(best.fault))], key=_GAIN)
     return best, _rival(best, trials) if best.fault.kind is FaultKind.STUCK else []
 
 
@@ -227,9 +227,10 @@ def _beside(fault: Fault) -> List[Fault]:
     return [other for other in others if other.is_possible]
 
 
-def _tried(found: MotionFindings, fault: Fault) -> _Trial:
+def _tried(found: MotionFindings, fault: Fault, start: Optional[State] = None) -> _Trial:
+    """Return the trial of a fault; start: where the fit without one of the sonar begins, if that is known."""
     if isinstance(fault, SonarFault):
-        run, fit = fit_without(found.run, fault)
+        run, fit = fit_without(found.run, fault, start)
         gain = fit.log_likelihood - found.fit.log_likelihood
         if not np.isnan(fault.begin):
             unchanged = replace(fault, sizes=(0.0,))

@@ -8,6 +8,7 @@ from made_harbour import TURN, deaf, tour, with_wild_odometry
 from made_models import DVL_ODOMETRY, errors_of, followed, solver_parameters
 
 from mlsm_manager.joint_solver.batch_solver import fit_of
+from mlsm_manager.joint_solver.live_solver import followed_anew
 from mlsm_manager.joint_solver.motion_models import DIRECTION
 from mlsm_manager.joint_solver.normal_equations import DELAY
 from mlsm_manager.joint_solver.position_models import DvlFactors
@@ -73,6 +74,13 @@ def test_the_same_scans_give_the_same_bytes(made, live, batch):
     again = followed(made.scans)
     assert again.state.nodes.tobytes() == live.state.nodes.tobytes()
     assert fit_of(again.solution).state.nodes.tobytes() == batch.state.nodes.tobytes()
+
+
+def test_a_run_that_is_followed_anew_goes_where_it_went(live):
+    astray = live.state.copy()
+    astray.nodes[9:, :2] += 10.0
+    anew = live.solution.with_state(followed_anew(live.solution.with_state(astray), 8))
+    np.testing.assert_allclose(anew.places, live.solution.places, atol=0.2)
 
 
 def test_a_scan_that_is_not_newer_is_refused_and_changes_nothing(made):

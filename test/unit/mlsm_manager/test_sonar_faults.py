@@ -126,7 +126,7 @@ def test_where_beams_stop_the_position_is_less_and_less_known_and_the_time_is_na
         shortened(broken.mount_upside_down(COMPASS), 100.0),
         shortened(broken.range_changed(COMPASS, 50.0, 1.5), 100.0),
         broken.range_changed(COMPASS, MIDDLE, 0.5),
-        broken.range_changed(shortened(source("harbour compass", 400.0), 240.0, 160.0), 69.0, 0.511),
+        broken.range_changed(shortened(source("harbour compass", 400.0), 280.0, 120.0), 109.0, 0.511),
     ],
     ids=["over", "longer ranges", "shorter ranges", "shorter ranges near a wall"],
 )
