@@ -1,7 +1,7 @@
 """What the odometry reported: over the whole run as far as it is known, and at some times."""
 
 from dataclasses import dataclass, field
-from typing import Any, Tuple
+from typing import Any, Dict, Tuple
 
 import numpy as np
 
@@ -60,6 +60,10 @@ class GrowingTable:
     def __getitem__(self, name: str) -> np.ndarray:
         """Return a column (n, ...), a view that is valid until the next change."""
         return self._columns[name].values
+
+    def at(self, rows: np.ndarray) -> Dict[str, np.ndarray]:
+        """Return `rows` (n,) int of each column, by name."""
+        return {name: array.values[rows] for name, array in self._columns.items()}
 
     def extend(self, **rows: np.ndarray) -> None:
         """Append m rows: (m, ...) of each column."""

@@ -73,8 +73,9 @@ class PointTable:
 
     def points(self, rows: np.ndarray) -> Tuple[SurfacePoints, np.ndarray]:
         """Return the points in `rows` (n,) int, and the scan (n,) int of each."""
-        columns = (self._table[name][rows] for name in _OF_POINTS)
-        return SurfacePoints(*columns), self._table["scans"][rows].astype(np.int64)
+        columns = self._table.at(rows)
+        scans = columns.pop("scans").astype(np.int64)
+        return SurfacePoints(**columns), scans
 
     def heard(self, first: int, last: int) -> Tuple[SurfacePoints, np.ndarray]:
         """Return the points of scans `first` to `last` - 1, oldest scan first, and the scan (n,) int of each."""
