@@ -23,7 +23,7 @@ from node_support.errors import RefusedInput
 ODOMETRY = "odometry"  # under which the name of a run's model is stored
 _ESTIMATE = "estimate."
 _SUBMAPS = "islands"  # the name in stored maps
-_FREE_ANEW = 10  # scans: a fit of the whole run comes after
+_FREE_ANEW = 10  # free scans where a run is followed anew: fewer than usual, as a fit of the whole run follows
 _FORGOTTEN_AT_ONCE = 60  # scans: a multiple of the usual numbers of parts of a turn; takes some milliseconds
 
 
@@ -285,7 +285,9 @@ class LiveSolver:
 
 
 def followed_anew(run: Solution, first: int) -> State:
-    """Return the unknowns of a run whose scans from `first` on are followed anew, as if it had begun with them.
+    """Return the unknowns of a run whose scans from `first` on are solved again, one after the other.
+
+    That part is solved as if the run had begun with it, and then put where node `first` was; earlier nodes stay.
 
     Raises RefusedInput where a fit has no finite solution.
     """

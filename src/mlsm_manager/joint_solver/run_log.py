@@ -187,7 +187,7 @@ class RunLog:
         return other
 
     def grown(self) -> Iterator["RunLog"]:
-        """Yield a log of the same odometry again and again, as it takes one scan of this one after the other."""
+        """Yield a new log each time it has taken one more scan of this one; it shares the odometry."""
         log = RunLog(self.sonar_in_base)
         log.odometry = self.odometry
         log._node_times.extend(self.node_times[:1])

@@ -34,7 +34,7 @@ _SHARE = 0.1  # of a step, in which the likelihood changes evenly
 _FARTHEST = 2.0  # steps: beyond, likelihoods are no parabolas
 _LARGEST = np.log(5.0)  # of settings: more is none
 _CHANGES = 4  # of ranges, that are tried
-_BEFORE = 8  # scans before a change, from which on a run is followed anew: about as many as hear the same
+_BEFORE = 8  # scans: a run is followed anew from so many before a change on; about as many hear the same
 _FEWEST = 10  # points of a scan that tell how far it hears
 _STEEP = 4.0  # nats a step: with less no fault of the kind makes even a marina, which tells least, three nats likelier
 
@@ -124,9 +124,9 @@ class SonarFault:
 def fit_without(run: Solution, fault: SonarFault, start: Optional[State] = None) -> Tuple[Solution, QuickFit]:
     """Return a run without a fault of its sonar, and its fit.
 
-    start: of the fit. Without one it begins, after a change of ranges, where the odometry leads, for the path that they
-    made may be far from the true one. Where the odometry tells no distances it begins where scan after scan leads, and
-    on that path too, which may be near where some scans met the map.
+    start: where the fit begins. By default it begins at the run as it is. The path after a change of ranges may be far
+    from the true one: there it begins at the odometry's path. With a compass alone it begins twice, at the run as it is
+    and at the path that is found when its scans are followed anew, and the likelier fit is returned.
     """
     changed = replace(run, log=fault.logged(run.log))
     return changed, fit_from(changed, _starts(run, changed, fault) if start is None else [start])

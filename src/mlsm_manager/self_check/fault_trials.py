@@ -228,7 +228,7 @@ def _beside(fault: Fault) -> List[Fault]:
 
 
 def _tried(found: MotionFindings, fault: Fault, start: Optional[State] = None) -> _Trial:
-    """Return the trial of a fault; start: where the fit without one of the sonar begins, if that is known."""
+    """Return the trial of a fault. start: where the fit without a fault of the sonar begins; None for the usual."""
     if isinstance(fault, SonarFault):
         run, fit = fit_without(found.run, fault, start)
         gain = fit.log_likelihood - found.fit.log_likelihood
