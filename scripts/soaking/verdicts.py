@@ -73,7 +73,8 @@ def rows(samples: Sequence[Sample], listener: Listener, printed: str) -> List[Ju
     """Return what the samples of a run, a listener, and what all processes printed tell."""
     settled = [one for one in samples if one.hours >= _SETTLED]
     halves = samples[: len(samples) // 2], samples[len(samples) // 2 :]
-    waiting = [float(np.median([one.waiting for one in half])) for half in halves]
+    # Below 0 where arrivals were told later than what was sent: none are known to wait.
+    waiting = [float(np.median([max(one.waiting, 0) for one in half])) for half in halves]
     return [
         *(row for name in sorted(samples[-1].held) for row in _of_process(name, samples, settled)),
         *_of_scans(settled),

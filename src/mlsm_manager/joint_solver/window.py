@@ -148,9 +148,10 @@ class Window:
         last = self._log.scan_count
         first = max(0, last - free_nodes)
         self._frozen = nearest_groups(solution, first)
-        self._recent = first - first % self._parameters.group_scans
+        self._group_scans = self._parameters.group_scans
+        self._recent = first - first % self._group_scans
         self._layout = Layout(first, last, self._odometry.width, self._groups(first))
-        middles = np.append(self._frozen.scans[:, self._parameters.group_scans // 2], first)
+        middles = np.append(self._frozen.scans[:, self._group_scans // 2], first)
         self._held_covariance = joint_covariance(covariances[middles]) if first else np.zeros((0, 0))
         self._recent_points = self._log.surfaces.heard(self._recent, last)
         self._motion = self._log.node_motion(np.arange(first, last + 1))
@@ -170,17 +171,17 @@ class Window:
         if not self._parameters.post_confidence:
             return None
         recent = np.arange(self._recent, self._layout.last)
-        importance = np.repeat(self._frozen.group_importance, self._parameters.group_scans)
+        importance = np.repeat(self._frozen.group_importance, self._group_scans)
         scans, importance = np.append(self._frozen.scans, recent), np.append(importance, np.ones(len(recent)))
         same = self._run.submaps.numbers[scans] == self._run.submaps.newest
         return PostComparisons(self._log.posts, self._parameters, scans[same], importance[same])
 
     def _groups(self, first: int) -> np.ndarray:
         """Return the group (first,) of each frozen node: its group's, and one more for nodes beside the window."""
-        number_of_group = np.full(first // self._parameters.group_scans + 1, -1)
+        number_of_group = np.full(first // self._group_scans + 1, -1)
         number_of_group[self._frozen.numbers] = np.arange(len(self._frozen.numbers))
         number_of_group[-1] = len(self._frozen.numbers)
-        return number_of_group[np.arange(first) // self._parameters.group_scans]
+        return number_of_group[np.arange(first) // self._group_scans]
 
     def fit(self, bend: Optional[Bend] = None) -> None:
         """Move the free nodes to the solution; the loops of a bend only pull them near."""
@@ -262,7 +263,7 @@ class Window:
         surfaces = [weak.without(points, points.scans) for points in placed]
         recent = surfaces[1]
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        self._lists = self._lists or [Neighbours(points, self._parameters.group_scans) for points in surfaces]
+        self._lists = self._lists or [Neighbours(points, self._group_scans) for points in surfaces]
         pairs = [pairs_of(own, sources, points, cut, parameters) for own, points in zip(self._lists, surfaces)]
         met = [(one, sources, points) for one, points in zip(pairs, surfaces)]
         if self._known is not None:
