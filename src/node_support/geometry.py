@@ -27,6 +27,11 @@ def grid(line: np.ndarray) -> np.ndarray:
     return np.stack(np.meshgrid(line, line, indexing="ij"), axis=-1).reshape(-1, 2)
 
 
+def cells_of(points: np.ndarray, side: float) -> np.ndarray:
+    """Return (n, 2) int64 cell indices of points (n, >= 2), floor(x / side), floor(y / side) as in thesis 6.5.6."""
+    return np.floor(points[:, :2] / side).astype(np.int64)
+
+
 def cell_keys(cells: np.ndarray) -> np.ndarray:
     """Return (n,) int64, one key per cell; cells is (n, 2) int64 with |index| < 2**31. Keys sort by x, then by y."""
     return (cells[:, 0] << 32) + cells[:, 1]
@@ -36,6 +41,16 @@ def cells_of_keys(keys: np.ndarray) -> np.ndarray:
     """Return the (n, 2) int64 cells whose keys `cell_keys` gave."""
     low = ((keys & 0xFFFFFFFF) ^ 0x80000000) - 0x80000000
     return np.column_stack([(keys - low) >> 32, low])
+
+
+def keys_of(points: np.ndarray, side: float) -> np.ndarray:
+    """Return (n,) int64, the keys of the cells of points (n, >= 2)."""
+    return cell_keys(cells_of(points, side))
+
+
+def squares_of(places: np.ndarray, side: float) -> np.ndarray:
+    """Return the number (n,), from 0 on, of the cell that each of `places` (n, >= 2) lies in."""
+    return np.unique(keys_of(places, side), return_inverse=True)[1]
 
 
 def members(sizes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:

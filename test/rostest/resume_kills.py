@@ -29,8 +29,8 @@ sys.path += [str(PACKAGE_ROOT / "test/unit"), str(PACKAGE_ROOT / "test/unit/mlsm
 from made_harbour import SONAR_IN_BASE, tour
 
 from mlsm_manager.scan_matching.scan import Scan
-from mlsm_manager.surface_map.blocks import cells_of
 from mlsm_manager.surface_map.map_file import read_map
+from node_support.geometry import cells_of
 from sonar_processing.cloud import Cloud
 from sonar_processing.ros.conversions import cloud_to_message
 from underwater_map_construction.msg import StampedIntensityCloud

@@ -18,8 +18,7 @@ from mlsm_manager.joint_solver.odometry_log import Motion
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.velocity_models import AHEAD, ASIDE
-from mlsm_manager.surface_map.blocks import squares_of
-from node_support.geometry import rotated
+from node_support.geometry import rotated, squares_of
 
 _COUNT = 6000  # particles: with 1000 one simulated tour of two is lost
 _START_SPEED = 0.3  # m/s: the usual speed of a small vehicle

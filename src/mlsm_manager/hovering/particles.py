@@ -14,7 +14,7 @@ from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.surface_map.blocks import squares_of
+from node_support.geometry import squares_of
 
 FACING = 0.75  # least cosine between two normals, so that both sides of a wall stay apart
 

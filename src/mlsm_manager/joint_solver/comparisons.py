@@ -4,7 +4,7 @@ A point is compared with its nearest neighbours in every group of scans.
 """
 
 from dataclasses import replace
-from typing import Iterable, Iterator, Optional, Tuple
+from typing import Iterable, Iterator, List, Tuple
 
 import numpy as np
 
@@ -27,42 +27,39 @@ Comparison = Tuple[Pairs, PlacedPoints, PlacedPoints]
 """Pairs, with the points and the surfaces that they compare."""
 
 
-class Neighbours:
-    """Finds for each point and each group of scans the nearest points of other scans."""
+def neighbours_of(sources: PlacedPoints, targets: PlacedPoints, cut: float, group_scans: int) -> Tuple[np.ndarray, ...]:
+    """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
 
-    def __init__(self, targets: PlacedPoints, group_scans: int) -> None:
-        """targets: ascending by scan; every `group_scans` scans of them are searched together."""
-        _, groups = np.unique(targets.scans // group_scans, return_inverse=True)
-        self._groups = groups.astype(np.int64)
-
-    def within(self, sources: PlacedPoints, targets: PlacedPoints, cut: float) -> Tuple[np.ndarray, ...]:
-        """Return rows of sources, rows of their neighbours, distances [m] and shares, each (m,), up to `cut` [m].
-
-        For each source and each group of scans these are the nearest targets of other scans, and their shares add up to
-        1. targets: those of the beginning, perhaps moved. Raises ValueError for places that are not finite.
-        """
-        if not len(sources.scans) or not len(targets.scans):
-            nothing = np.empty(0, dtype=np.int64)
-            return nothing, nothing, np.empty(0), np.empty(0)
-        for points in (sources, targets):
-            if not np.isfinite(points.places).all():
-                nowhere = np.count_nonzero(~np.isfinite(points.places).all(axis=1))
-                raise ValueError(f"{nowhere} of {len(points)} points without a finite place")
-        arrays = sources.places, sources.scans, targets.places, targets.scans
-        return shared_neighbours(*(np.ascontiguousarray(array) for array in arrays), self._groups, cut, TIE)
+    For each source and each group of so many scans these are the nearest targets of other scans, and their shares add
+    up to 1. targets: ascending by scan. Raises ValueError for places that are not finite.
+    """
+    if not len(sources.scans) or not len(targets.scans):
+        nothing = np.empty(0, dtype=np.int64)
+        return nothing, nothing, np.empty(0), np.empty(0)
+    for points in (sources, targets):
+        if not np.isfinite(points.places).all():
+            nowhere = np.count_nonzero(~np.isfinite(points.places).all(axis=1))
+            raise ValueError(f"{nowhere} of {len(points)} points without a finite place")
+    groups = targets.scans // group_scans
+    numbers = np.cumsum(np.diff(groups, prepend=groups[:1]) != 0)
+    arrays = sources.places, sources.scans, targets.places, targets.scans
+    return shared_neighbours(*(np.ascontiguousarray(array) for array in arrays), numbers, cut, TIE)
 
 
-def pairs_of(
-    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, parameters: SolverParameters
-) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets` that count.
+def comparisons_of(
+    sources: PlacedPoints, surfaces: Iterable[PlacedPoints], cut: float, group_scans: int, min_cosine: float
+) -> List[Comparison]:
+    """Return those of all `sources` with their nearest neighbours in each group of each set of `surfaces` that count.
 
     Points of one scan are never compared with each other, nor surfaces that face different ways. In its own group, a
     point is compared with the nearest one of another scan. Neighbours that are as near share the comparison.
     """
-    own, others = ((np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
-    limits = (cut, FADING * cut, parameters.min_cosine, parameters.min_cosine + COSINE_FADING)
-    return weighed_pairs(lists.within(sources, targets, cut), own, others, limits)
+    met, limits = [], (cut, FADING * cut, min_cosine, min_cosine + COSINE_FADING)
+    for targets in surfaces:
+        own, others = ((np.ascontiguousarray(points.normals), points.qualities) for points in (sources, targets))
+        found = neighbours_of(sources, targets, cut, group_scans)
+        met.append((weighed_pairs(found, own, others, limits), sources, targets))
+    return met
 
 
 def weighted(pairs: Pairs, factors: np.ndarray) -> Pairs:
@@ -146,7 +143,6 @@ class PostComparisons:
         self.points = posts.points(rows)
         self._importance = parameters.post_confidence * np.repeat(importance, counts)
         self._parameters = replace(parameters, normal_deviation=0.0)
-        self._lists: Optional[Neighbours] = None
         self.compared = np.empty(0, dtype=int)
 
     def add(self, equations: NormalEquations, layout: Layout, points: PlacedPoints, cut: float) -> None:
@@ -154,23 +150,22 @@ class PostComparisons:
         if not self._importance.any():
             return
         sources = points.selected(points.scans >= layout.first)
-        if self._lists is None:
-            self._lists = Neighbours(points, self._parameters.group_scans)
+        found = neighbours_of(sources, points, cut, self._parameters.group_scans)
         near = _NEAR_IN_TIME * self._parameters.parts_per_turn
-        pairs = weighted(_post_pairs(self._lists, sources, points, cut, near), self._importance)
+        pairs = weighted(_post_pairs(found, sources, points, cut, near), self._importance)
         self.compared = sources.scans[np.unique(pairs.rows)]
         add_comparisons(equations, layout, _along_and_across(pairs, sources, points), self._parameters, cut)
 
 
 def _post_pairs(
-    lists: Neighbours, sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int
+    found: Tuple[np.ndarray, ...], sources: PlacedPoints, targets: PlacedPoints, cut: float, near_in_time: int
 ) -> Pairs:
-    """Return the comparisons of all `sources` with their nearest neighbours in each group of `targets`.
+    """Return the comparisons of all `sources` with what `neighbours_of` found for them among `targets`.
 
     A point counts if several of the `near_in_time` scans before and after its own heard one there too. Clutter meets
     clutter by chance, and would say that nothing moves.
     """
-    rows, neighbours, distance, shares = lists.within(sources, targets, cut)
+    rows, neighbours, distance, shares = found
     met = shares * ramp(distance, cut, FADING * cut) * targets.qualities[neighbours]
     near = np.abs(sources.scans[rows] - targets.scans[neighbours]) <= near_in_time
     confirmed = ramp(np.bincount(rows, met * near, len(sources)), *_CONFIRMED)

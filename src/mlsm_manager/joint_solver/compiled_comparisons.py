@@ -39,7 +39,7 @@ def _ramp(value, zero, one):
     error_model="numpy",
 )
 def weighed_pairs(found, sources, targets, limits):
-    """Return the comparisons that count; see comparisons.pairs_of. found: what Neighbours.within returns.
+    """Return the comparisons that count; see comparisons.comparisons_of. found: what neighbours_of returns.
 
     sources, targets: normals (n, 2) of points, and how well they are known (n,). limits: distance [m] from which on
     pairs do not count, and up to which they count fully; likewise the cosines between both normals.

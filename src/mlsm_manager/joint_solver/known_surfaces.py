@@ -11,8 +11,7 @@ from mlsm_manager.joint_solver.normal_equations import BEFORE_THE_RUN
 from mlsm_manager.joint_solver.parameters import SolverParameters
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.surface_points import LEAST_REACH, ramp, surface_normals
-from mlsm_manager.surface_map.blocks import cells_of, keys_of
-from node_support.geometry import cell_keys
+from node_support.geometry import cell_keys, cells_of, keys_of
 
 _CANDIDATES = 3  # blocks that are looked at for each point: more than there usually are as near as the nearest one
 _SQUARE = 32.0  # m: side of the squares into which blocks are sorted, to find those of an area without looking at all

@@ -114,7 +114,7 @@ class DvlFactors(OdometryModel):
         scale contains that; else the fit would shrink the world to make them smaller.
         """
         step, before, durations = np.diff(motion.positions), nodes[:-1], np.diff(motion.times)
-        one = np.ones(len(step))
+        one, starts = np.ones(len(step)), step_columns(nodes, 0)
         yaw = (before[:, YAW] + nodes[1:, YAW]) / 2.0
         turned_step = product(np.exp(1j * (before[:, DIRECTION] + yaw)), step)
         scaled = (1.0 + before[:, SCALE]) * turned_step
@@ -127,8 +127,8 @@ class DvlFactors(OdometryModel):
             by_angle = -part(1j * scaled)
             slopes = (one, -one, by_angle, -part(turned_step) - residual, by_angle / 2.0, by_angle / 2.0)
             slopes += (-durations,) * self._carriers
-            columns = step_columns(nodes, self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *carriers)
-            yield Residuals(columns, np.column_stack(slopes), residual, weight)
+            columns = np.array([self.width + axis, axis, DIRECTION, SCALE, YAW, self.width + YAW, *carriers])
+            yield Residuals(starts + columns, np.column_stack(slopes), residual, weight)
 
 
 class ThrusterFactors(DvlFactors):

@@ -120,28 +120,27 @@ class AdaptedPrior:
     term: the one of the newest step; empty for a model without a mixture.
     """
 
-    def __init__(self, mixture: Optional[PriorMixture], term: Optional[PriorTerm]) -> None:
-        """term: to begin with; None for what is known without any echo."""
-        self._mixture, self.term = mixture, PriorTerm(np.zeros((0, 0)), np.zeros(0))
+    def __init__(self, mixture: Optional[PriorMixture], term: Optional[PriorTerm], start: int) -> None:
+        """term: to begin with; None for what is known without any echo. start: first column of the node."""
+        self._mixture, self.term, self._start = mixture, PriorTerm(np.zeros((0, 0)), np.zeros(0)), start
         self._is_added = False
         if mixture is not None:
             self.term = term or mixture.term(Gaussian(mixture.mean, np.diag(mixture.widest**2)))
 
-    def add(
-        self, equations: NormalEquations, start: int, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]
-    ) -> None:
-        """Add what follows from the step before to the unknowns of a node (width,) in the columns from `start` on.
+    def add(self, equations: NormalEquations, node: np.ndarray, covariance: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Add what follows from the step before to the unknowns of the node (width,).
 
         covariance: from columns (k,) to theirs after that step (k, k).
         """
         if self._mixture is None:
             return
         own = np.array(self._mixture.columns)
+        columns = self._start + own
         if self._is_added:
-            found = Gaussian(node[own], covariance(start + own))
+            found = Gaussian(node[own], covariance(columns))
             self.term = self._mixture.term(self.term.removed_from(found))
         self._is_added = True
-        self.term.add(equations, start + own, node[own])
+        self.term.add(equations, columns, node[own])
 
 
 def _term_between(known: Gaussian, wanted: Gaussian) -> PriorTerm:

@@ -173,7 +173,9 @@ class RivalSolvers:
         """Keep the doubt where it is the largest."""
         apart = np.hypot(*(others - places)[:, :2].T)
         deviation = np.sqrt(np.maximum(np.trace(added[:, :2, :2], axis1=1, axis2=2), 0.0))
-        self.doubt = Doubt(self.told, self._names[1], float(apart.max()), float(deviation.max()), own)
+        shown, other = self._names
+        told = likelier(shown, self.lead, other)
+        self.doubt = Doubt(told, other, float(apart.max()), float(deviation.max()), own)
 
 
 def likelier(shown: str, lead: float, other: str) -> str:

@@ -6,7 +6,7 @@ the vehicle. Both pretend that the vehicle stands still, since every point is co
 """
 
 from dataclasses import dataclass, replace
-from typing import Sequence, Tuple
+from typing import List, Sequence, Tuple
 
 import numpy as np
 
@@ -76,6 +76,14 @@ class WeakDirections:
         lengths = np.hypot(*normals.T)
         normals = normals / np.maximum(lengths, _NOTHING)[:, np.newaxis]
         return replace(points, normals=normals, qualities=points.qualities * ramp(lengths, *_FACING))
+
+
+def without_weak_directions(
+    sets: Sequence[PlacedPoints], parameters: SolverParameters
+) -> Tuple[List[PlacedPoints], WeakDirections]:
+    """Return `sets` without what they say along their weak directions, and these."""
+    weak = WeakDirections.of(sets, parameters)
+    return [weak.without(points, points.scans) for points in sets], weak
 
 
 def _in_common(sums: np.ndarray) -> np.ndarray:

@@ -10,10 +10,9 @@ import numpy as np
 
 from mlsm_manager.joint_solver.comparisons import (
     Comparison,
-    Neighbours,
     PostComparisons,
     add_comparisons,
-    pairs_of,
+    comparisons_of,
     support,
     weighted,
 )
@@ -36,7 +35,7 @@ from mlsm_manager.joint_solver.normal_equations import (
 from mlsm_manager.joint_solver.placement import PlacedPoints
 from mlsm_manager.joint_solver.prior_mixture import AdaptedPrior
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.weak_directions import WeakDirections
+from mlsm_manager.joint_solver.weak_directions import without_weak_directions
 
 _AGE_DISTANCE = 5.0  # m by which the newest group counts as farther than the oldest: the oldest drifted least
 _FADING = 0.1  # share of the reach within which a group fades out, so that none appears at once
@@ -161,10 +160,10 @@ class Window:
         self._believed = prior_of(columns, np.zeros(len(columns)), deviations, held)
         self._known, self._are_apart = solution.known, solution.submaps.numbers.any()
         self._solution: Optional[EquationSolution] = None
-        self._lists: List[Neighbours] = []
         self._met: List[Comparison] = []
         self._posts = self._post_comparisons()
-        self._prior = AdaptedPrior(self._odometry.mixture, solution.prior_term)
+        newest = self._layout.node_start(last)
+        self._prior = AdaptedPrior(self._odometry.mixture, solution.prior_term, newest)
 
     def _post_comparisons(self) -> Optional[PostComparisons]:
         """Return those with the frozen groups and with the scans since; None where posts are ignored."""
@@ -200,13 +199,13 @@ class Window:
         loops: that pull, as found at the unknowns `start`. Return the equations that were solved.
         """
         equations = self._expected()
-        self._run.fixes.add(equations, self._layout, self._motion.poses, self.state.nodes[self._layout.first :])
+        if self._run.fixes:
+            self._run.fixes.add(equations, self._layout, self._motion.poses, self.state.nodes[self._layout.first :])
         met = self._surfaces_met(cut)
         add_comparisons(equations, self._layout, met, self._parameters, cut)
         if self._posts is not None:
             self._posts.add(equations, self._layout, self._run.placed(self._posts.points), cut)
-        newest = self._layout.node_start(self._layout.last)
-        self._prior.add(equations, newest, self.state.nodes[-1], self._own_covariance)
+        self._prior.add(equations, self.state.nodes[-1], self._own_covariance)
         if loops:
             equations.add(*pulls_of(loops, self._layout, self.state.nodes, start))
         self._solution = self._solved(equations)
@@ -251,21 +250,15 @@ class Window:
         return np.append(node, frozen.run), deviations
 
     def _surfaces_met(self, cut: float) -> List[Comparison]:
-        """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed.
-
-        Neighbours are looked up once for all steps.
-        """
+        """Return the comparisons of the free scans with all surfaces up to `cut` [m] apart, as they are summed."""
         parameters, frozen = self._parameters, self._frozen.points
         # To first order.
         frozen = replace(frozen, places=frozen.places + frozen.by_run @ (self.state.run - self._frozen.run))
         placed = frozen, self._run.placed(self._recent_points)
-        weak = WeakDirections.of(placed, parameters)
-        surfaces = [weak.without(points, points.scans) for points in placed]
+        surfaces, weak = without_weak_directions(placed, parameters)
         recent = surfaces[1]
         sources = recent.selected(slice(int(np.searchsorted(recent.scans, self._layout.first)), None))
-        self._lists = self._lists or [Neighbours(points, self._group_scans) for points in surfaces]
-        pairs = [pairs_of(own, sources, points, cut, parameters) for own, points in zip(self._lists, surfaces)]
-        met = [(one, sources, points) for one, points in zip(pairs, surfaces)]
+        met = comparisons_of(sources, surfaces, cut, self._group_scans, parameters.min_cosine)
         if self._known is not None:
             to_known, known = self._known.compared(sources, cut, parameters)
             known = weak.without(known, sources.scans[to_known.rows])

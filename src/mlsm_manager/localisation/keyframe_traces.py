@@ -14,12 +14,12 @@ import numpy as np
 
 from mlsm_manager.localisation.clouds import Placement
 from mlsm_manager.surface_map.block_store import RunningCopy, finished
-from mlsm_manager.surface_map.blocks import Blocks, keys_of
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.free_space import BeamFindings, Carver, CarveReport, FirstEchoes, pairs_of_groups
 from mlsm_manager.surface_map.insertion import blocks_of
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap, Overlay
 from mlsm_manager.surface_map.operations import LevelTransform, moved
-from node_support.geometry import move_of
+from node_support.geometry import keys_of, move_of
 
 _STRAYED = 0.5  # of a cell, by which a keyframe must have moved to be followed anew: less changes few free cells
 MOST_FOLLOWED = 2

@@ -8,7 +8,7 @@ from mlsm_manager.scan_matching.distributions import LocalDistributions
 from mlsm_manager.scan_matching.point_equations import NARROWEST, Normal, PointEquations
 from mlsm_manager.scan_matching.residual_covariance import PointEvidence, residual_covariance
 from mlsm_manager.scan_matching.scan_path import POSE, PlanarMotion
-from mlsm_manager.surface_map.blocks import squares_of
+from node_support.geometry import squares_of
 
 _SCALES = (8.0, 4.0, NARROWEST)  # of the robust kernel, as the iterations go on: the first for a start one cell off
 _ITERATIONS_PER_SCALE = 4

@@ -7,7 +7,8 @@ from weakref import WeakSet
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks, keys_of
+from mlsm_manager.surface_map.blocks import COUNT, MOST_CROSSINGS, ROW_WIDTH, Blocks
+from node_support.geometry import keys_of
 from node_support.numba_cache import compiled
 
 _PIECE = 1 << 15  # rows copied at once: 3 MB, one or two milliseconds

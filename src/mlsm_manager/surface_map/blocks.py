@@ -6,7 +6,7 @@ from typing import Protocol, Sequence
 
 import numpy as np
 
-from node_support.geometry import cell_keys
+from node_support.geometry import cells_of, keys_of
 
 MEAN = slice(0, 4)
 SQUARES = slice(4, 8)
@@ -135,18 +135,3 @@ class BlockSource(Protocol):
 
 def all_of(source: BlockSource) -> Blocks:
     return source.in_box(np.full(2, -np.inf), np.full(2, np.inf))
-
-
-def cells_of(points: np.ndarray, resolution: float) -> np.ndarray:
-    """Return (n, 2) int64 cell indices of points (n, >= 2), floor(x / r), floor(y / r) as in thesis 6.5.6."""
-    return np.floor(points[:, :2] / resolution).astype(np.int64)
-
-
-def keys_of(points: np.ndarray, resolution: float) -> np.ndarray:
-    """Return (n,) int64, the keys of the cells of points (n, >= 2)."""
-    return cell_keys(cells_of(points, resolution))
-
-
-def squares_of(places: np.ndarray, side: float) -> np.ndarray:
-    """Return the number (n,), from 0 on, of the square of a grid that each of `places` (n, 2) lies in. side: m."""
-    return np.unique(keys_of(places, side), return_inverse=True)[1]

@@ -16,9 +16,9 @@ from typing import Tuple
 
 import numpy as np
 
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, keys_of
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry import cell_keys, members
+from node_support.geometry import cell_keys, keys_of, members
 from node_support.parameters import ParameterSet, parameter
 
 _MOST_POINTS = 50  # more make a block no surer: a ship that lay there for an hour has left once it is not heard

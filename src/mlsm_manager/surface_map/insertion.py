@@ -12,7 +12,8 @@ from typing import Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import NO_BLOCK, BlockStore, Runs
-from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks, keys_of
+from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks
+from node_support.geometry import keys_of
 from node_support.numba_cache import compiled
 
 _VALUES = 4  # mean of x y z and strength, then as many sums of squares: the first columns of a row

@@ -6,9 +6,9 @@ from typing import Sequence, Tuple
 import numpy as np
 
 from mlsm_manager.surface_map.block_store import BlockStore, RunningCopy
-from mlsm_manager.surface_map.blocks import BOTTOM, TOP, Blocks, cells_of
+from mlsm_manager.surface_map.blocks import BOTTOM, TOP, Blocks
 from mlsm_manager.surface_map.insertion import InsertReport, admitted, compile_loops, insert_blocks, insert_points
-from node_support.geometry import cell_keys, cells_of_keys, grid
+from node_support.geometry import cell_keys, cells_of, cells_of_keys, grid
 
 _EXTENT = [0, 1, BOTTOM, TOP]  # columns of a block that tell where it lies
 

@@ -19,7 +19,7 @@ from made_models import (
     some_state,
 )
 
-from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, Neighbours, summed
+from mlsm_manager.joint_solver.comparisons import COSINE_FADING, FADING, TIE, neighbours_of, summed
 from mlsm_manager.joint_solver.compiled_comparisons import Pairs, scattered_terms, weighed_pairs
 from mlsm_manager.joint_solver.normal_equations import RANGE_SCALE
 from mlsm_manager.joint_solver.odometry_log import as_complex
@@ -210,7 +210,7 @@ def test_points_without_a_finite_place_are_refused():
     points = some_points(np.random.RandomState(0), 20, [0, 1])
     lost = replace(points, places=points.places * np.where(np.arange(20) == 7, np.nan, 1.0)[:, np.newaxis])
     with pytest.raises(ValueError, match="without a finite place"):
-        Neighbours(points, 5).within(lost, points, 2.0)
+        neighbours_of(lost, points, 2.0, 5)
 
 
 SCANS = np.repeat(np.arange(6), 15)
@@ -241,10 +241,9 @@ MOVES = st.tuples(st.floats(0.0, 3.0), st.sampled_from([1.0, 2.0, 3.5]))
 def test_neighbours_are_what_a_look_at_all_points_says_however_far_these_move_and_whatever_the_cut(seed, moves, common):
     rng = np.random.RandomState(seed)
     places = rng.uniform(0.0, 15.0, (len(SCANS), 2))
-    lists = Neighbours(placed(places), BLOCK_SCANS)
     for move, cut in [(0.0, CUT), *moves]:
         places = places + rng.normal(0.0, move, places.shape) + common
-        rows, neighbours, _, shares = lists.within(placed(places), placed(places), cut)
+        rows, neighbours, _, shares = neighbours_of(placed(places), placed(places), cut, BLOCK_SCANS)
         found = np.zeros((len(places), len(places)))
         np.add.at(found, (rows, neighbours), shares)
         np.testing.assert_allclose(found, looked_at_all(places, cut), atol=1e-9)
@@ -256,7 +255,7 @@ def test_no_neighbour_takes_over_at_once():
     shares = []
     for place in np.linspace(-0.04, 0.04, 81):
         source = placed(np.array([[place, 0.0]]), np.array([9]))
-        _, neighbours, _, found = Neighbours(others, BLOCK_SCANS).within(source, others, CUT)
+        _, neighbours, _, found = neighbours_of(source, others, CUT, BLOCK_SCANS)
         shares.append(found[neighbours == 0].sum())
     steps = np.diff(shares)
     assert (shares[0], shares[-1]) == (0.0, 1.0)
@@ -266,5 +265,5 @@ def test_no_neighbour_takes_over_at_once():
 
 def test_a_point_far_outside_costs_no_memory_and_hides_no_neighbour():
     others = placed(np.array([[0.0, 0.0], [1e9, -1e9]]), np.array([0, 1]))
-    found = Neighbours(others, BLOCK_SCANS).within(placed(np.array([[0.5, 0.0]]), np.array([9])), others, CUT)
+    found = neighbours_of(placed(np.array([[0.5, 0.0]]), np.array([9])), others, CUT, BLOCK_SCANS)
     assert found[1].tolist() == [0]

@@ -10,7 +10,7 @@ from made_harbour import logged, tour
 from made_models import DVL, solution_of, solver_parameters, some_state
 from made_posts import heard
 
-from mlsm_manager.joint_solver.comparisons import Neighbours, pairs_of
+from mlsm_manager.joint_solver.comparisons import comparisons_of
 from mlsm_manager.joint_solver.estimate import LiveEstimate
 from mlsm_manager.joint_solver.normal_equations import NormalEquations, Residuals, dense_solution, sparse_solution
 from mlsm_manager.joint_solver.odometry_log import GrowingArray, OdometryLog
@@ -31,7 +31,7 @@ def placed_in(log, state):
 
 def test_a_point_is_compared_with_another_scan_of_its_own_block(log):
     placed = placed_in(log, some_state(log))
-    pairs = pairs_of(Neighbours(placed, 5), placed, placed, 2.0, solver_parameters())
+    ((pairs, _, _),) = comparisons_of(placed, [placed], 2.0, 5, solver_parameters().min_cosine)
     assert len(pairs.rows) > 100
     assert (placed.scans[pairs.rows] != placed.scans[pairs.neighbours]).all()
 

@@ -7,10 +7,10 @@ from hypothesis import strategies as st
 from made_maps import in_order, map_with, partition, random_map
 
 from mlsm_manager.surface_map import block_store, insertion
-from mlsm_manager.surface_map.blocks import Blocks, cells_of
+from mlsm_manager.surface_map.blocks import Blocks
 from mlsm_manager.surface_map.insertion import InsertReport
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry import cell_keys
+from node_support.geometry import cell_keys, cells_of
 
 
 def _grid(side, z, place=0.0):

@@ -86,12 +86,12 @@ def test_a_term_that_was_added_can_be_taken_out_again(information, vector):
 
 @pytest.mark.parametrize("truth", [0.0, 0.3])
 def test_step_by_step_the_prior_becomes_that_of_the_component_that_holds(truth):
-    prior, node, covariance = AdaptedPrior(MIXTURE, None), np.zeros(2), np.eye(2)
+    prior, node, covariance = AdaptedPrior(MIXTURE, None, start=0), np.zeros(2), np.eye(2)
     for _ in range(5):
         equations = NormalEquations(2)
         equations.add(prior_of(np.arange(2), node, np.array([1.0, WIDE])))
         equations.add(Residuals(np.array([[1]]), np.ones((1, 1)), node[1:] - truth, np.array([0.04**-2])))
-        prior.add(equations, 0, node, lambda columns, found=covariance: found[np.ix_(columns, columns)])
+        prior.add(equations, node, lambda columns, found=covariance: found[np.ix_(columns, columns)])
         information, _ = equations.dense()
         covariance = np.linalg.inv(information)
         node = node - covariance @ equations.gradient
@@ -100,7 +100,7 @@ def test_step_by_step_the_prior_becomes_that_of_the_component_that_holds(truth):
 
 
 def test_a_model_without_a_mixture_adds_nothing():
-    prior, equations = AdaptedPrior(None, None), NormalEquations(2)
-    prior.add(equations, 0, np.zeros(2), np.zeros)
+    prior, equations = AdaptedPrior(None, None, start=0), NormalEquations(2)
+    prior.add(equations, np.zeros(2), np.zeros)
     assert not equations.gradient.any()
     assert prior.term.vector.size == 0
