@@ -59,10 +59,16 @@ def members(sizes: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     return groups, np.arange(len(groups)) - np.repeat(np.cumsum(sizes) - sizes, sizes)
 
 
+def bearings_of(vectors: np.ndarray) -> np.ndarray:
+    """Return the angles (...) [rad] of vectors (..., >= 2), counter-clockwise from x."""
+    # Of columns of a table numpy picks one of two functions by where in memory the result lies; they differ in the last
+    # bit, so that equal runs would end differently. Contiguous values always take the same one.
+    return np.arctan2(*(np.asarray(vectors[..., axis], order="C") for axis in (1, 0)))
+
+
 def rotated(vectors: np.ndarray, yaw: np.ndarray) -> np.ndarray:
     """Return vectors (..., 2) turned counter-clockwise by `yaw` (...)."""
-    # On a column of a table numpy picks between two sines by where in memory the result lies; they differ in the last
-    # bit, so that equal runs would end differently. Contiguous values always take the same one.
+    # Contiguous as in bearings_of.
     yaw = np.asarray(yaw, order="C")
     cos, sin = np.cos(yaw), np.sin(yaw)
     x, y = vectors[..., 0], vectors[..., 1]

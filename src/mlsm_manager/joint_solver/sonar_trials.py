@@ -15,7 +15,7 @@ from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.surface_points import SurfacePoints, slants_of
 from mlsm_manager.scan_matching.scan import Scan
 from node_support.errors import RefusedInput
-from node_support.geometry import inverse, transformed
+from node_support.geometry import bearings_of, inverse, transformed
 
 _ARM, _TILT, _FACTOR = 0.6, np.radians(14.0), np.log(1.1)  # m, rad, logarithm: less is how mounts and water are
 
@@ -102,7 +102,7 @@ class SonarFault:
         normals[wrong] = normals[wrong] @ np.linalg.inv(stretch)
         normals /= np.hypot(*normals.T)[:, np.newaxis]
         slants = slants_of(places, normals)
-        ranges, bearings = np.hypot(*places.T), np.arctan2(places[:, 1], places[:, 0])
+        ranges, bearings = np.hypot(*places.T), bearings_of(places)
         return replace(points, ranges=ranges, bearings=bearings, normals=normals, slants=slants)
 
     def sonar_in_base(self, told: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mlsm_manager.scan_matching.scan import Scan
-from node_support.geometry import inverse, rotated, transformed, wrapped
+from node_support.geometry import bearings_of, inverse, rotated, transformed, wrapped
 from sonar_processing.filters.threshold import height_threshold
 
 _NEIGHBOURS = 12  # enough for a line with the noise of dense echoes, few enough to stay on one wall
@@ -40,7 +40,7 @@ class Sights(NamedTuple):
     def of(cls, scan: Scan, sonar_in_base: np.ndarray) -> "Sights":
         """Return those of a scan; sonar_in_base: (2,) m, where the sonar is in base_link."""
         places = transformed(inverse(scan.track.at(scan.times)), scan.points[:, :2]) - sonar_in_base
-        ranges, bearings = np.hypot(places[:, 0], places[:, 1]), np.arctan2(places[:, 1], places[:, 0])
+        ranges, bearings = np.hypot(places[:, 0], places[:, 1]), bearings_of(places)
         reach, per_echo = reaches(scan.times, bearings, ranges), points_per_echo(scan.times, ranges)
         return cls(places, ranges, bearings, reach, per_echo)
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan import Scan, Track
 from node_support.errors import RefusedInput, counted
-from node_support.geometry import inverse, matrices, move_of, transformed
+from node_support.geometry import bearings_of, inverse, matrices, move_of, transformed
 from node_support.headers import DAY
 from recordings.bags.bag import RecordingError
 from recordings.beams import RecordedBeams
@@ -203,7 +203,7 @@ def _track(tree: FrameTree, stamps: np.ndarray, near_ns: np.ndarray, path: Path,
         reason = tree.why_not(*frames, stamps) or "a single stamp"
         raise RecordingError(f"{path}: no odometry, tf from {frames[1]} to {frames[0]}: {reason}")
     poses = poses[known]
-    yaws = np.arctan2(poses[:, 1, 0], poses[:, 0, 0])
+    yaws = bearings_of(poses[..., 0])
     return Track(stamps[known] * 1e-9, np.column_stack([poses[:, :2, 3], yaws]))
 
 

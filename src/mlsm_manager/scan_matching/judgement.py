@@ -10,6 +10,8 @@ from typing import Callable, Tuple
 import numpy as np
 from scipy.spatial import cKDTree
 
+from node_support.geometry import bearings_of
+
 _PLACES = 48  # with so many the standard deviation of their shares is known to a tenth
 _SHIFT = 8.0  # m: beyond what a wall is thick, within what a scan sees
 _LEAST_DEVIATION = 0.02  # of a share of 150 echoes: three of them
@@ -88,6 +90,5 @@ def _beside(values: np.ndarray, merged: np.ufunc) -> np.ndarray:
 
 def _polar(offsets: np.ndarray) -> Tuple[np.ndarray, np.ndarray]:
     """Return the number (n,) of the direction and the distance (n,) of offsets (n, 2)."""
-    x, y = np.array(offsets.T, order="C")
-    turns = np.arctan2(y, x) / (2.0 * np.pi) + 0.5
-    return (turns * _DIRECTIONS).astype(np.int64) % _DIRECTIONS, np.hypot(x, y)
+    turns = bearings_of(offsets) / (2.0 * np.pi) + 0.5
+    return (turns * _DIRECTIONS).astype(np.int64) % _DIRECTIONS, np.hypot(*offsets.T)

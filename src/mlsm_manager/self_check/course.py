@@ -6,7 +6,7 @@ import numpy as np
 
 from mlsm_manager.scan_matching.scan import Track
 from mlsm_manager.self_check.causes import Cause
-from node_support.geometry import rotated, wrapped
+from node_support.geometry import bearings_of, rotated, wrapped
 
 _SECONDS, _GONE = 10.0, 1.0  # s of a stretch, and m in it from which on it has a direction
 _FEWEST = 10  # stretches
@@ -75,7 +75,7 @@ def course_of(path: Track, largest: float = LARGEST, mostly: float = _MOSTLY) ->
     moves = moves[np.hypot(*moves.T) > _GONE]
     if len(moves) < _FEWEST:
         return NOT_TOLD
-    angles = np.arctan2(moves[:, 1], moves[:, 0])
+    angles = bearings_of(moves)
     middle = float(np.angle(np.exp(1j * angles).sum()))
     middle = float(wrapped(middle + np.median(wrapped(angles - middle))))
     aside = wrapped(angles - middle)

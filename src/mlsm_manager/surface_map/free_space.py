@@ -18,7 +18,7 @@ import numpy as np
 
 from mlsm_manager.surface_map.blocks import BOTTOM, COUNT, ROW_WIDTH, TOP, Blocks
 from mlsm_manager.surface_map.mlsm import MultiLevelSurfaceMap
-from node_support.geometry import cell_keys, keys_of, members
+from node_support.geometry import bearings_of, cell_keys, keys_of, members
 from node_support.parameters import ParameterSet, parameter
 
 _MOST_POINTS = 50  # more make a block no surer: a ship that lay there for an hour has left once it is not heard
@@ -83,7 +83,7 @@ def beam_paths(beams: FirstEchoes, width: float, resolution: float) -> BeamPaths
     sample, number = members(across)
     share = (number + 0.5) / across[sample] - 0.5
     beam, distance = beam[sample], distance[sample]
-    angle = np.arctan2(arm[:, 1], arm[:, 0])[beam] + width * share
+    angle = bearings_of(arm)[beam] + width * share
     places = beams.origins[beam, :2] + distance[:, np.newaxis] * np.column_stack([np.cos(angle), np.sin(angle)])
     rise = (beams.echoes[:, 2] - beams.origins[:, 2]) / np.maximum(reach, resolution)
     return _pairs(beam, distance, beams.origins[beam, 2] + rise[beam] * distance, np.floor(places / resolution))

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from node_support.errors import RefusedInput
-from node_support.geometry import rotation_matrices
+from node_support.geometry import bearings_of, rotation_matrices
 from recordings.bags.bag import RecordingError
 from recordings.motion.pose_track import PoseTrack
 from sonar_processing.beams.beam import Beam, PlacedBeam
@@ -65,7 +65,7 @@ def clock_offset(beams: List[Beam], track: PoseTrack, T_base_sonar: np.ndarray) 
     one lie in the other. Raises RecordingError where the echoes do not tell.
     """
     echoes, turns = _echoes(beams, T_base_sonar), rotation_matrices(track.rotations)
-    yaws = np.unwrap(np.arctan2(turns[:, 1, 0], turns[:, 0, 0]))
+    yaws = np.unwrap(bearings_of(turns[..., 0]))
     way = _Way(track.stamps_ns * 1e-9, np.column_stack([track.translations[:, :2], yaws]))
     offsets = _candidates(echoes, way)
     scores = np.array([_meeting(way.placed(echoes, offset), echoes.turn) for offset in offsets])

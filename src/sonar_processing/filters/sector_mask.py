@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from node_support.geometry import FULL_TURN
+from node_support.geometry import FULL_TURN, bearings_of
 from node_support.headers import StampParameters
 from node_support.parameters import parameter
 from sonar_processing.cloud import Cloud, SonarPoses
@@ -41,7 +41,7 @@ class SectorMask:
         T_sonar_cloud = np.linalg.inv(self._sonar_poses(cloud.frame_id, times))[beams]
         points = cloud.points[valid, :3].astype(np.float64)
         places = np.einsum("nij,nj->ni", T_sonar_cloud[:, :3, :3], points) + T_sonar_cloud[:, :3, 3]
-        turn = np.mod(np.arctan2(places[:, 1], places[:, 0]) - parameters.start_angle, FULL_TURN)
+        turn = np.mod(bearings_of(places) - parameters.start_angle, FULL_TURN)
         inside = (turn <= parameters.width) & (np.linalg.norm(places, axis=1) <= parameters.reach)
         keep = np.ones(len(cloud), dtype=bool)
         keep[valid] = ~inside

@@ -6,7 +6,7 @@ from typing import List, Tuple
 
 import numpy as np
 
-from node_support.geometry import FULL_TURN, wrapped
+from node_support.geometry import FULL_TURN, bearings_of, wrapped
 from sonar_processing.beams.beam import PlacedBeam, beam_directions, bin_points
 from sonar_processing.cloud import Cloud
 from sonar_processing.scans.parameters import LaserPick, SonarToCloudParameters
@@ -141,7 +141,7 @@ def planar_laser_scan(scan: PolarScan, parameters: SonarToCloudParameters) -> Pl
     range_max = scan.strengths.shape[1] * scan.range_resolution
     inside = (ranges >= parameters.min_range) & (ranges <= range_max)
     farthest_first = np.flatnonzero(inside)[np.argsort(-ranges[inside], kind="stable")]
-    bearings = np.arctan2(echoes[farthest_first, 1], echoes[farthest_first, 0])
+    bearings = bearings_of(echoes[farthest_first])
     ray = np.rint((bearings + math.pi) * rays / FULL_TURN).astype(np.int64) % rays
     result = np.full(rays, np.inf, dtype=np.float32), np.zeros(rays, dtype=np.float32)
     result[0][ray], result[1][ray] = ranges[farthest_first], strengths[farthest_first]

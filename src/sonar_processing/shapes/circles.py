@@ -7,6 +7,7 @@ import numpy as np
 from scipy.optimize import least_squares
 from scipy.spatial import cKDTree
 
+from node_support.geometry import bearings_of
 from node_support.parameters import ParameterError, parameter
 from sonar_processing.beams.parameters import beam_width_parameter
 from sonar_processing.cloud import Cloud
@@ -264,7 +265,7 @@ def range_differences(
     """
     measured, to_center = points - origins, center - origins
     ranges = np.hypot(measured[:, 0], measured[:, 1])
-    bearings = np.arctan2(measured[:, 1], measured[:, 0]) - np.arctan2(to_center[:, 1], to_center[:, 0])
+    bearings = bearings_of(measured) - bearings_of(to_center)
     rays = bearings[:, np.newaxis] + np.linspace(-0.5, 0.5, _RAYS) * beam_width
     distance = np.hypot(to_center[:, 0], to_center[:, 1])[:, np.newaxis]
     beside = distance * np.sin(rays)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from node_support.geometry import bearings_of
 from sonar_processing.cloud import Cloud
 
 _SAME_POINT = 1e-6
@@ -120,7 +121,7 @@ def sightings(echoes: BeamEchoes, chosen: np.ndarray, origins: np.ndarray) -> Si
     taken, first, inverse = np.unique(echoes.time_stamps[chosen], return_index=True, return_inverse=True)
     numbers = _beam_numbers(taken)
     axes = (points - origins)[first]
-    steps = np.abs(np.diff(np.unwrap(np.arctan2(axes[:, 1], axes[:, 0])))) / np.diff(numbers)
+    steps = np.abs(np.diff(np.unwrap(bearings_of(axes)))) / np.diff(numbers)
     steps = steps[steps > 0.0]
     step = float(np.median(steps)) if len(steps) else 0.0
     return Sightings(points, origins, numbers[inverse], echoes.weights[chosen], echoes.lengths[chosen], step)

@@ -7,6 +7,7 @@ from typing import Any, Optional, Tuple
 import numpy as np
 
 from node_support.errors import RefusedInput
+from node_support.geometry import bearings_of
 from sonar_simulator.echoes.beam_tracer import Contacts
 from sonar_simulator.world.world import DEFAULT_MATERIAL, Material, material_of_reflection
 
@@ -95,7 +96,7 @@ def rays_of_points(points: np.ndarray, intensities: Optional[np.ndarray], rows: 
             "scans refused",
             f"{len(points)} points; there must be at least one, all finite and none at the sensor's centre",
         )
-    bearings = np.arctan2(points[:, 1], points[:, 0])
+    bearings = bearings_of(points)
     rows = rows or _row_count(bearings)
     if len(points) % rows:
         raise RefusedInput("scans refused", f"{len(points)} points are not {rows} rows")
