@@ -261,7 +261,7 @@ def _room(points, blocks):
     error_model="numpy",
 )
 def shared_neighbours(sources, source_scans, places, scans, blocks, cut, tie):
-    """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see comparisons.Neighbours.
+    """Return rows of sources, rows of their neighbours, distances and shares, each (m,); see comparisons.neighbours_of.
 
     sources: (n, 2) m. places: (k, 2) m, scans: (k,), blocks: (k,) from 0 on: of the targets, k > 0.
     """
