@@ -20,7 +20,6 @@ from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.normal_equations import State
 from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.sonar_trials import SonarFault
 
 _REACH, _STEP = 40.0, 1.0  # m: shifts that are weighed; a post tells to about a metre
 _ANY, _SMALL = (1.0, _REACH), (2.0, 7.0)  # m: far ones reach another place, small ones climb where far ones fit nothing
@@ -205,19 +204,17 @@ def solved_best(live: LiveSolver) -> BatchResult:
     return replace(fits[best], pose_covariances=fits[best].pose_covariances + misfit_covariance(spread))
 
 
-def strafes(
-    ahead: LiveSolver, strafing: LiveSolver, with_other_ranges: Sequence[Tuple[SonarFault, Solution]] = ()
-) -> bool:
+def strafes(ahead: LiveSolver, strafing: LiveSolver, without_faults: Sequence[Tuple[RunLog, Solution]] = ()) -> bool:
     """Return whether echoes are clearly likelier in the run of a solver that expects strafing, of the same scans.
 
-    with_other_ranges: changes of ranges, without which scans of a vehicle that goes ahead may go on, and such runs.
+    without_faults: what `strafing` had logged without faults, and runs of a vehicle that goes ahead without them.
     """
 
     def likelihood(run: Solution, log: RunLog) -> float:
         return log_likelihood(echoes_of_run(log, strafing.parameters), run.path(log.node_times)[:, :2])
 
     log = strafing.log
-    others = [likelihood(run, fault.logged(log)) for fault, run in with_other_ranges]
+    others = [likelihood(run, logged) for logged, run in without_faults]
     return likelihood(strafing.solution, log) > _STRAFES * max([likelihood(ahead.solution, log), *others])
 
 

@@ -11,8 +11,8 @@ from mlsm_manager.joint_solver.batch_solver import BatchResult, fit_of
 from mlsm_manager.joint_solver.live_solver import LiveSolver
 from mlsm_manager.joint_solver.motion_models import Compass, OdometryModel
 from mlsm_manager.joint_solver.position_models import DvlFactors, PositionOdometry, ThrusterFactors, UnsureFactors
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
-from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.joint_solver.velocity_models import HeadingFactors, Speeds, UnaidedFactors
 from mlsm_manager.scan_matching.prediction import OdometryErrors
 from node_support.files import package_folder
@@ -166,16 +166,14 @@ def fitted(solver: LiveSolver) -> BatchResult:
     return solved_best(solver)
 
 
-def strafes(
-    ahead: LiveSolver, hovering: LiveSolver, with_other_ranges: Sequence[Tuple[SonarFault, Solution]] = ()
-) -> bool:
+def strafes(ahead: LiveSolver, hovering: LiveSolver, without_faults: Sequence[Tuple[RunLog, Solution]] = ()) -> bool:
     """Return whether echoes are clearly likelier with HOVERING than with HEADING. Both solvers took the same scans.
 
-    with_other_ranges: changes of ranges and the runs with HEADING without them.
+    without_faults: what `hovering` had logged without faults, and runs with HEADING without them.
     """
     from mlsm_manager.hovering import best_fit
 
-    return best_fit.strafes(ahead, hovering, with_other_ranges)
+    return best_fit.strafes(ahead, hovering, without_faults)
 
 
 @lru_cache(maxsize=None)

@@ -4,6 +4,7 @@ from argparse import Namespace
 from dataclasses import replace
 from typing import List, Optional, Sequence, Tuple
 
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import SonarFault
 from mlsm_manager.localisation.odometry_profiles import OdometryKind, strafes
@@ -17,8 +18,9 @@ from mlsm_manager.scan_matching.scan import Scan
 from mlsm_manager.self_check.beam_causes import ranges_are_told
 from mlsm_manager.self_check.course import moves_are_turned
 from mlsm_manager.self_check.echo_causes import echo_findings
-from mlsm_manager.self_check.fault_trials import with_other_ranges
+from mlsm_manager.self_check.fault_trials import likelier_without, logged_without
 from mlsm_manager.self_check.scan_pairs import AS_TOLD, Hypothesis
+from mlsm_manager.self_check.standing import standing_causes
 from mlsm_manager.self_check.verdict import Answer
 from recordings.motion.vehicle_motion import MotionSource
 from sonar_processing.filters.echo_extractor import EchoExtractor
@@ -52,13 +54,26 @@ def followed(
     other = OdometryFound(OdometryKind.HOVERING, f"{odometry.reason}, and echoes speak for a vehicle that strafes")
     changed = with_odometry(extracting, other.kind, options.fixed)
     again = _replayed(recording, scans, changed)
-    ranges = []
-    if not ranges_are_told(recording.sent):
-        suspected = echo_findings(scans, recording.sonar_in_base, replayed.corrections).suspected
-        ranges = with_other_ranges(replayed.solver.solution, recording.track, suspected)
-    if again.solver is not None and strafes(replayed.solver, again.solver, ranges):
+    if again.solver is None:
+        return odometry, parameters, replayed
+    if strafes(replayed.solver, again.solver, _ahead_without_faults(recording, scans, replayed, again.solver.log)):
         return other, changed, again
     return odometry, parameters, replace(replayed, strafing=again.solver)
+
+
+def _ahead_without_faults(
+    recording: Recording, scans: List[Scan], replayed: Replayed, strafing: RunLog
+) -> List[Tuple[RunLog, Solution]]:
+    """Return runs of a vehicle that goes ahead without a fault with which it may seem to strafe.
+
+    Before each stands what a run that is logged for `strafing` had logged without that fault.
+    """
+    suspected = list(echo_findings(scans, recording.sonar_in_base, replayed.corrections).suspected)
+    standing = standing_causes(scans, recording.track, replayed.corrected)
+    suspected += [cause.fault for cause in standing if cause.fault is not None]
+    are_told = ranges_are_told(recording.sent)
+    found = likelier_without(replayed.solver.solution, recording.track, suspected, are_told)
+    return [(logged_without(strafing, fault, run), run) for fault, run in found]
 
 
 def positions_mislead(

@@ -8,6 +8,7 @@ import numpy as np
 
 from mlsm_manager.joint_solver.batch_solver import BatchResult, QuickFit, compared_since, fit_of
 from mlsm_manager.joint_solver.normal_equations import State
+from mlsm_manager.joint_solver.odometry_log import OdometryLog
 from mlsm_manager.joint_solver.odometry_trials import (
     OdometryErrors,
     fit_from,
@@ -18,6 +19,7 @@ from mlsm_manager.joint_solver.odometry_trials import (
     steps_kept,
     with_odometry,
 )
+from mlsm_manager.joint_solver.run_log import RunLog
 from mlsm_manager.joint_solver.solution import Solution
 from mlsm_manager.joint_solver.sonar_trials import (
     SonarFault,
@@ -61,6 +63,8 @@ _NATS_TURNED = 15.0  # by which one must be likelier than none: in a marina a wr
 _SHOWN = 10.0  # nats for a compass that stuck: its headings show it, also where it missed no turn
 _MORE = 1.05  # times as much: true distances add 3 % in a marina, and a path that is wrongly halved 17 to 33 %
 _EARLIER, _LATER = 4, 2  # nodes: a change of ranges looks like one of distances once the run gives way
+# With which scans lie as those of a vehicle that strafes.
+_SEEM_TO_STRAFE = (SonarKind.RANGES, FaultKind.SLIP, FaultKind.STUCK)
 _FAULTS = 3  # at most, one after the other
 _FEWEST = 15  # nodes: fewer do not tell a change from noise, unless pairs of scans show when
 
@@ -157,16 +161,27 @@ def _of_sonar(found: MotionFindings) -> List[SonarFault]:
     return [*faults, *changed_ranges(found.run)] if found.is_alone else faults
 
 
-def with_other_ranges(run: Solution, track: Track, suspected: Sequence[Fault]) -> List[Tuple[SonarFault, Solution]]:
-    """Return changes of ranges that make a run likelier of a vehicle that goes ahead, each with the run without it.
+def likelier_without(
+    run: Solution, track: Track, suspected: Sequence[Fault], ranges_told: bool
+) -> List[Tuple[Fault, Solution]]:
+    """Return faults without which a run is likelier of a vehicle that goes ahead, each with the run without it.
 
-    suspected: what pairs of scans show; of it only such changes are tried.
+    suspected: what pairs of scans and headings show; of it only slips of the head, compasses that stuck and changes of
+    ranges are tried, these unless messages tell them.
     """
     fit = fit_of(run)
-    shown = [fault for fault in suspected if fault.kind is SonarKind.RANGES]
     found = MotionFindings(replace(run, state=fit.state), fit, track)
-    trials = [_tried(found, fault) for fault in [*changed_ranges(run), *shown]]
+    faults = [*changed_ranges(run), *(one for one in _possible(suspected) if one.kind in _SEEM_TO_STRAFE)]
+    trials = [_tried(found, one) for one in faults if one.kind is not SonarKind.RANGES or not ranges_told]
     return [(trial.fault, trial.fitted) for trial in trials if trial.gain > 0.0]
+
+
+def logged_without(log: RunLog, fault: Fault, run: Solution) -> RunLog:
+    """Return what a run had logged without a fault, and with the headings of `run`, which is without it."""
+    if isinstance(fault, SonarFault):
+        return fault.logged(log)
+    track = log.odometry.track_from(-np.inf)
+    return log.since(0, OdometryLog.of(track.with_poses(run.path(track.times))))
 
 
 def _best(found: MotionFindings, faults: Sequence[Fault]) -> Tuple[_Trial, List[np.ndarray]]:

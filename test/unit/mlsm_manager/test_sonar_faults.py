@@ -5,7 +5,7 @@ import pytest
 from benchmarks import fault_makers as broken
 from benchmarks.faults import shortened, source
 from benchmarks.harness import mapped_as
-from benchmarks.rare_faults import mount_tilted
+from benchmarks.rare_faults import compass_sticks, mount_tilted
 from made_recordings import touring
 
 from mlsm_manager.joint_solver.sonar_trials import SonarFault, SonarKind, ranges_changed_at
@@ -127,8 +127,9 @@ def test_where_beams_stop_the_position_is_less_and_less_known_and_the_time_is_na
         shortened(broken.range_changed(COMPASS, 50.0, 1.5), 100.0),
         broken.range_changed(COMPASS, MIDDLE, 0.5),
         broken.range_changed(shortened(source("harbour compass", 400.0), 280.0, 120.0), 109.0, 0.511),
+        compass_sticks(shortened(source("harbour compass", 400.0), 200.0, 180.0), 70.0),
     ],
-    ids=["over", "longer ranges", "shorter ranges", "shorter ranges near a wall"],
+    ids=["over", "longer ranges", "shorter ranges", "shorter ranges near a wall", "compass stuck"],
 )
 def test_a_fault_beside_a_compass_alone_does_not_make_the_vehicle_seem_to_strafe(recording):
     found = mapped_as(recording)
