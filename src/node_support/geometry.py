@@ -1,6 +1,7 @@
-"""Poses as arrays; T_a_b takes coordinates in frame b to coordinates in frame a; metres, radians.
+"""Poses, bearings, and the square cells of grids, as arrays; metres, radians.
 
-Planar poses hold x, y and yaw in their last axis; poses in space are 4x4 matrices.
+T_a_b takes coordinates in frame b to coordinates in frame a. Planar poses hold x, y and yaw in their last axis; poses
+in space are 4x4 matrices.
 """
 
 import math

@@ -64,9 +64,9 @@ def followed(
 def _ahead_without_faults(
     recording: Recording, scans: List[Scan], replayed: Replayed, strafing: RunLog
 ) -> List[Tuple[RunLog, Solution]]:
-    """Return runs of a vehicle that goes ahead without a fault with which it may seem to strafe.
+    """Return runs of a vehicle that goes ahead, each without one fault with which it may seem to strafe.
 
-    Before each stands what a run that is logged for `strafing` had logged without that fault.
+    strafing: what is logged of a vehicle that strafes. Each run comes after this log without the same fault.
     """
     suspected = list(echo_findings(scans, recording.sonar_in_base, replayed.corrections).suspected)
     standing = standing_causes(scans, recording.track, replayed.corrected)

@@ -167,7 +167,7 @@ def likelier_without(
     """Return faults without which a run is likelier of a vehicle that goes ahead, each with the run without it.
 
     suspected: what pairs of scans and headings show; of it only slips of the head, compasses that stuck and changes of
-    ranges are tried, these unless messages tell them.
+    ranges are tried. ranges_told: whether messages tell changes of ranges: none are tried.
     """
     fit = fit_of(run)
     found = MotionFindings(replace(run, state=fit.state), fit, track)
