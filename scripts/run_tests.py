@@ -21,10 +21,9 @@ STEP_TIMEOUT = 1200.0
 # s: downloads 100 MB, or computes with what the others leave, on a machine that is three times slower than most.
 SPARE_TIMEOUT = 3600.0
 # Rostests mostly wait; each has a master of its own.
-TOGETHER = 2
-# Spare steps at once: one leaves a processor idle where it waits itself. On two processors three of them, and three
-# rostests, slow each other down: all steps then take a tenth more of processor time.
-SPARE_TOGETHER = 2
+TOGETHER = 3
+# Spare steps at once: as many as leave no processor idle while the others wait, also where one of them waits itself.
+SPARE_TOGETHER = 3
 # The lowest there is: who waits for a message gets the processor at once.
 SPARE_PRIORITY = 19
 # Rostests that measure processor time; all others wait for what must come, however late.
