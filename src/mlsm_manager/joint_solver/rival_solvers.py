@@ -94,10 +94,7 @@ class RivalSolvers:
     @property
     def told(self) -> str:
         """What the echoes tell of the odometry; empty where it was named."""
-        if np.isnan(self._dvl_lead):
-            return ""
-        shown, other = self._names
-        return likelier(shown, self.lead, other)
+        return "" if np.isnan(self._dvl_lead) else self._told_and_other[0]
 
     @property
     def lead(self) -> float:
@@ -163,18 +160,18 @@ class RivalSolvers:
         return self.other if self.shown.odometry.mixture is None else self.shown
 
     @property
-    def _names(self) -> Tuple[str, str]:
-        """Names of the odometry that is shown, and of the other one."""
+    def _told_and_other(self) -> Tuple[str, str]:
+        """What the echoes tell of the odometry, and the name of the one that is not shown."""
         unsure, mixture = self._unsure, self._unsure.odometry.mixture
         names = mixture.likeliest(unsure.told).name, mixture.rival.name
-        return names if self.shown is unsure else names[::-1]
+        shown, other = names if self.shown is unsure else names[::-1]
+        return likelier(shown, self.lead, other), other
 
     def _know(self, places: np.ndarray, others: np.ndarray, added: np.ndarray, own: float) -> None:
         """Keep the doubt where it is the largest."""
         apart = np.hypot(*(others - places)[:, :2].T)
         deviation = np.sqrt(np.maximum(np.trace(added[:, :2, :2], axis1=1, axis2=2), 0.0))
-        shown, other = self._names
-        told = likelier(shown, self.lead, other)
+        told, other = self._told_and_other
         self.doubt = Doubt(told, other, float(apart.max()), float(deviation.max()), own)
 
 

@@ -110,7 +110,7 @@ def without_faults(
             return found
         places = errors.places
         faults = suspected if are_few else [*_likely(errors), *suspected, *_of_sonar(found)]
-        faults = [fault for fault in faults if fault.kind is not SonarKind.RANGES or not ranges_told]
+        faults = _untold(faults, ranges_told)
         if len(found.causes) == _FAULTS or not faults:
             break
         best, rival = _best(found, faults)
@@ -172,7 +172,7 @@ def likelier_without(
     fit = fit_of(run)
     found = MotionFindings(replace(run, state=fit.state), fit, track)
     faults = [*changed_ranges(run), *(one for one in _possible(suspected) if one.kind in _SEEM_TO_STRAFE)]
-    trials = [_tried(found, one) for one in faults if one.kind is not SonarKind.RANGES or not ranges_told]
+    trials = [_tried(found, one) for one in _untold(faults, ranges_told)]
     return [(trial.fault, trial.fitted) for trial in trials if trial.gain > 0.0]
 
 
@@ -227,6 +227,11 @@ def _possible(suspected: Sequence[Fault]) -> List[Fault]:
     others = [one for one in suspected if one.kind is not FaultKind.STUCK and not is_missed_turn(one)]
     turns = (_TURNED * np.arange(-12, 12)).tolist()
     return [*others, *(replace(one, sizes=(turn,)) for one in stuck[:_FAULTS] for turn in turns)]
+
+
+def _untold(faults: Sequence[Fault], ranges_told: bool) -> List[Fault]:
+    """Return the faults without changes of ranges, where messages tell all of these."""
+    return [fault for fault in faults if fault.kind is not SonarKind.RANGES or not ranges_told]
 
 
 def _beside(fault: Fault) -> List[Fault]:
